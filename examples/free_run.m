@@ -1,4 +1,4 @@
-% The exported model over a record, record.csv, with flow.m from `host-fit codegen --lang matlab -o flow.m`.
+% Simulates the exported model over a record, record.csv, with flow.m from `host-fit codegen --lang matlab -o flow.m`.
 record = dlmread('record.csv', ',', 1, 0); % t, u, y
 y = flow(record(:, 2));
 measured = record(:, 3);

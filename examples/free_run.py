@@ -1,4 +1,4 @@
-"""The exported model over a record: python3 free_run.py RECORD.csv, with flow.py from `host-fit codegen --lang python`."""
+"""Simulates the exported model over a record: python3 free_run.py RECORD.csv, with flow.py from `host-fit codegen --lang python`."""
 
 import sys
 

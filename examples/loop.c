@@ -1,4 +1,4 @@
-/* The exported law holds the exported model: gcc -std=c99 -ffp-contract=off loop.c -lm, with flow.c beside it. */
+/* The exported law controls the exported model: gcc -std=c99 -ffp-contract=off loop.c -lm, with flow.c beside it. */
 #include "flow.c"
 #include <stdio.h>
 

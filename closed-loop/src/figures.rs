@@ -18,8 +18,8 @@ pub struct Figures {
     pub switches_per_s: f64,
     /// Share of time with the valve open: the air used, relative to steady blowing.
     pub air: f64,
-    /// Time until the mean of 250 samples of the friction stays within 5 % of the last reference for 1000
-    /// samples (each at least as many milliseconds, [`span`]); `None` if it never does.
+    /// Time until the mean of 250 samples of the friction stays within 5 % of the last reference for 1000 samples
+    /// (in each case at least as many milliseconds, [`span`]); `None` if it never does.
     pub settling_s: Option<f64>,
 }
 
@@ -29,8 +29,8 @@ const SETTLED_MEAN: usize = 250;
 const SETTLED_FOR: usize = 1000;
 
 impl Figures {
-    /// The figures of `trace` from sample `from` on; settling from the start.
-    /// A part without samples gives zeros.
+    /// The figures of `trace` from sample `from` on; the settling time counts from the start. A part without
+    /// samples gives zeros.
     #[must_use]
     pub fn of(trace: &Trace, from: usize) -> Self {
         let judged = trace.samples.get(from..).unwrap_or_default();

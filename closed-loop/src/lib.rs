@@ -1,7 +1,7 @@
 //! Closed-loop simulation at any sample period: controllers, plants and figures.
 //!
 //! The law of `model-core` and standard controllers run here on anything that is [`Controlled`]: a model, a
-//! simulated plant, a plant of the caller's own.
+//! simulated plant, or the caller's own plant.
 
 mod figures;
 mod model_flow;

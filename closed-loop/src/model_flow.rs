@@ -28,7 +28,7 @@ where
 }
 
 impl<'a, T: Real, M: Parts<T>, Y: Memory<T>, J: Memory<T>> ModelFlow<'a, T, M, Y, J> {
-    /// The model at rest, its channels held at `channels`, one sample every `sample_period_s`.
+    /// The model at rest, its channels constant at `channels`, one sample every `sample_period_s`.
     pub fn new(
         model: &'a M,
         at_rest: StateOf<T, M, Y, J>,

@@ -15,8 +15,7 @@ pub struct Relay {
 }
 
 impl Relay {
-    /// A relay that switches on at `half_band` (y, ≥ 0) below the reference and
-    /// off at as much above.
+    /// A relay that switches on at `half_band` (y, ≥ 0) below the reference and off at `half_band` above it.
     #[must_use]
     pub fn new(times: HoldTimes, half_band: f64) -> Self {
         Self {

@@ -2,10 +2,12 @@
 
 use std::fmt::Write as _;
 
-/// Length of a run whose samples are `period_s` apart: `samples`, or as many milliseconds if that is longer.
+/// Length of a run whose samples are `period_s` apart: `samples`, or the same number of milliseconds if that is
+/// longer.
 ///
-/// Models remember a number of samples, so a run of a fixed number of them shows the same of a model at any period from
-/// 1 ms on. At shorter periods a sample is a smaller part of the flow's own time, and the time counts.
+/// Models store a number of samples, so at any period from 1 ms on a run of a fixed number of samples shows the
+/// same part of a model's response. At shorter periods a sample is a smaller part of the flow's own time, so the
+/// length in time counts.
 ///
 /// ```
 /// assert_eq!(closed_loop::span(12_000, 0.1), 12_000);
@@ -18,7 +20,7 @@ pub fn span(samples: usize, period_s: f64) -> usize {
     samples.max((samples as f64 * 1e-3 / period_s).round() as usize)
 }
 
-/// A plant whose true friction is known besides the reading.
+/// A plant whose true friction is known in addition to the reading.
 pub trait Controlled {
     /// Hold time of a command, s.
     fn sample_period_s(&self) -> f64;
@@ -33,8 +35,8 @@ pub trait Controlled {
 pub trait Controller {
     /// Sets the reference (y).
     fn set_reference(&mut self, reference: f64);
-    /// The valve from this sample to the next, given the reading of this sample
-    /// (`None` where there is none).
+    /// The valve's position from this sample to the next, given the reading of this sample (`None` if it is
+    /// missing).
     fn command(&mut self, reading: Option<f64>) -> bool;
 }
 

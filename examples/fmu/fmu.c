@@ -1,8 +1,8 @@
 /* An FMU for co-simulation, FMI 3.0, around the C that `host-fit codegen --lang c --precision double` writes: flow.c, beside
  * this file. make_fmu.py makes the archive.
  *
- * y at a communication point is the reading under the inputs that are set there. A step is a whole number of sample periods,
- * through which the inputs are held. A run begins at rest.
+ * y at a communication point is the reading for the inputs that are set there. A step is a whole number of sample periods,
+ * during which the inputs are constant. A run begins at rest.
  */
 #include "flow.c"
 
@@ -29,7 +29,7 @@
 typedef enum { OK, WARNING, DISCARD, ERROR, FATAL } Status;
 typedef void (*Log)(void *environment, Status status, const char *category, const char *message);
 
-/* What a run is at. */
+/* The state of a run. */
 struct progress {
     struct model model;
     double inputs[FIRST + MODEL_CHANNELS]; /* by value reference; the first is not used */
@@ -51,7 +51,7 @@ static Status refuse(const struct instance *i, const char *why)
     return ERROR;
 }
 
-/* The reading at this sample; the model of `p` moves on. */
+/* Returns the reading at this sample and advances the model of `p`. */
 static double moved_on(struct progress *p)
 {
     double reading;
@@ -237,7 +237,7 @@ EXPORT Status fmi3DeserializeFMUState(struct instance *i, const uint8_t bytes[],
     return OK;
 }
 
-/* What the standard names and this FMU has not: other types, clocks, derivatives, the other interfaces. */
+/* Functions of the standard that this FMU does not provide: other types, clocks, derivatives, other interfaces. */
 #define NONE(type, get)                                                                                                     \
     EXPORT Status fmi3Get##type(struct instance *i, const uint32_t r[], size_t n, get v[], size_t m)                        \
     {                                                                                                                       \

@@ -19,14 +19,14 @@ source, target = pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[2])
 text = source.read_text()
 if "typedef double real;" not in text:
     sys.exit(f"{source}: export the model with `--lang c --precision double`")
-# Several at a time: each thread of the simulator works on its own copy.
+# Several instances may exist: each thread of the simulator has its own copy.
 for single in ["static struct model the_model;", "static int begun;"]:
     if text.count(single) != 1:
         sys.exit(f"{source}: not written by `host-fit codegen --lang c`")
     text = text.replace(single, single.replace("static", "static _Thread_local"))
 wrapper = (pathlib.Path(__file__).parent / "fmu.c").read_text()
 token = hashlib.sha256((text + wrapper).encode()).hexdigest()
-# The command of no jet, with which a run begins.
+# The command of no jet, the initial value of a run.
 stated = re.search(r"from now to the next one: (\S+) for no jet", text)
 off = float(stated[1]) if stated else 0.0
 wrapper = f'#define TOKEN "{token}"\n#define OFF {off!r}\n' + wrapper
@@ -49,7 +49,7 @@ with tempfile.TemporaryDirectory() as folder:
         model.describe_channel.restype, model.describe_usual.restype = ctypes.c_char_p, ctypes.c_double
         channels.append((model.describe_channel(n).decode(), model.describe_usual(n)))
 
-# Records have the columns t, u and y: no channel is called so.
+# Records have the columns t, u and y, so no channel has these names.
 names = ["t", "u", *(name for name, _ in channels), "y"]
 starts = [("u", off), *channels]
 inputs = "".join(

@@ -39,7 +39,7 @@ pub struct Disturbed<F> {
 }
 
 impl<F: Controlled> Disturbed<F> {
-    /// `flow` seen with `noise` through `converter`, repeatable by `seed`.
+    /// `flow` measured with `noise` through `converter`, repeatable by `seed`.
     pub fn new(
         flow: F,
         noise: Option<Noise>,

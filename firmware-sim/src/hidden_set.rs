@@ -26,8 +26,8 @@ pub struct HiddenSetPlan {
 impl HiddenSetPlan {
     /// A random rig hiding the named effects and faults (none of either is the null case).
     ///
-    /// The base plant has a state-dependent delay, unless a hidden effect sets the delay. The free
-    /// stream wanders when an effect needs it, and in a quarter of the other cases to no effect.
+    /// The base plant has a state-dependent delay, unless a hidden effect sets the delay. The free stream varies if
+    /// an effect needs it, and in a quarter of the other cases without influence.
     ///
     /// # Errors
     /// [`RigError`] for unknown names and for effects that exclude each other.

@@ -42,7 +42,7 @@ impl Converter {
         scaled.round().clamp(0.0, top) as u32
     }
 
-    /// The reading a code stands for (y).
+    /// The reading for a code (y).
     pub fn reading(&self, code: u32) -> f64 {
         let top = f64::from((1_u32 << self.bits.clamp(1, 24)) - 1);
         self.low + (self.high - self.low) * f64::from(code) / top

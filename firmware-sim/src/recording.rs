@@ -28,18 +28,18 @@ pub enum RigError {
     /// The instrument is impossible.
     #[error(transparent)]
     Instrument(#[from] InstrumentError),
-    /// What the rig gave is no recording.
+    /// The rig's readings are not a valid recording.
     #[error(transparent)]
     Data(#[from] DataError),
     /// No fault of that name.
     #[error("there is no fault `{0}`; the names are: {names}", names = Fault::NAMES.join(", "))]
     UnknownFault(String),
-    /// Two effects want the same part of the rig.
+    /// Two effects act on the same part of the rig.
     #[error("`{0}` and `{1}` exclude each other; hide one of them")]
     Exclusive(&'static str, &'static str),
 }
 
-/// In which units the rig is written down: the same samples, other numbers.
+/// The units of the recording: the same samples with other numbers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Units {
     /// Recorded times are the rig's times this factor.
@@ -53,24 +53,24 @@ impl Units {
     pub const OWN: Self = Self { time: 1.0, y: 1.0 };
 }
 
-/// A data set and what is really behind it.
+/// A data set with the truth behind it.
 #[derive(Debug, Clone)]
 pub struct Recorded {
-    /// What a user of the tool would have.
+    /// The data that a user of the tool would have.
     pub data: DataSet,
     /// The readings without noise, per record in the order of the data set (recorded y).
     pub noise_free: Vec<Vec<f64>>,
 }
 
-/// Everything but the commands that determines a data set, bit for bit.
+/// All properties except the commands that determine a data set bit for bit.
 pub(crate) struct Session<'a> {
     pub(crate) plant: &'a PlantSpec,
     pub(crate) instrument: &'a Instrument,
     pub(crate) nuisances: Nuisances,
-    /// Whether the free stream wanders and is recorded as the channel `u_inf`.
+    /// Whether the free stream varies and is recorded as the channel `u_inf`.
     pub(crate) free_stream: bool,
     pub(crate) units: Units,
-    /// Says nothing about what is hidden.
+    /// Does not contain the hidden effects.
     pub(crate) title: String,
     pub(crate) seed: u64,
 }
@@ -84,7 +84,7 @@ impl Session<'_> {
         let (mut records, mut noise_free) = (Vec::new(), Vec::new());
         for (index, (command, role)) in commands.into_iter().enumerate() {
             let n = command.levels.len();
-            // What happened before a record that begins in mid-run, which nobody wrote down.
+            // The unrecorded time before a record that begins in mid-run.
             let lead = self.nuisances.lead_samples;
             let mut levels = Vec::with_capacity(lead + n);
             let mut u = command.levels;
@@ -141,8 +141,7 @@ impl Session<'_> {
     }
 }
 
-/// The same commands with as many levels as it takes to show the effects; on/off if that is enough, unless
-/// the input is `graded` anyway.
+/// The same commands, with many levels if an effect requires them or the input is `graded`; otherwise on/off.
 pub(crate) fn with_levels(
     commands: Vec<(Command, Use)>,
     effects: &[Effect],

@@ -1,9 +1,9 @@
-//! Independent streams of random numbers under one seed, so that one draw more here changes nothing there.
+//! Independent streams of random numbers under one seed: a further draw from one stream does not change the others.
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-/// What the numbers are for. The order is part of every data set: new streams go to the end.
+/// The purposes of the streams. Their order is part of every data set, so new streams are appended.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Stream {
     Base,

@@ -1,11 +1,11 @@
-//! A signal remembered exactly: straight lines between knots, jumps at knots.
+//! An exact representation of a signal: linear between knots, jumps at knots.
 //!
-//! Transport delays read this memory at arbitrary past times, so a switching edge arrives when it
-//! physically would and not at the next sample.
+//! Transport delays read this memory at arbitrary past times, so a switching edge arrives at its exact time and not
+//! at the next sample.
 
 use std::collections::VecDeque;
 
-/// One remembered instant; `left` and `right` differ where the signal jumps.
+/// A stored instant; `left` and `right` differ if the signal jumps.
 #[derive(Debug, Clone, Copy)]
 struct Knot {
     t: f64,
@@ -13,21 +13,21 @@ struct Knot {
     right: f64,
 }
 
-/// The past of one signal, from long enough ago to serve the longest delay.
+/// The past of one signal, long enough for the longest delay.
 #[derive(Debug, Clone)]
 pub(crate) struct Waveform {
     knots: VecDeque<Knot>,
-    /// Knots forgotten so far, so that a [`Cursor`] survives forgetting.
+    /// Number of discarded knots, so that a [`Cursor`] stays valid.
     forgotten: usize,
     keep_s: f64,
 }
 
-/// A reader's place in a [`Waveform`]; makes reading forward cost a step or two.
+/// A reader's position in a [`Waveform`]; reading forward then costs one or two steps.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Cursor(usize);
 
 impl Waveform {
-    /// A signal that has been `value` for ever up to time 0 and remembers `keep_s` seconds.
+    /// A signal that has been `value` for all times up to 0 and stores `keep_s` seconds.
     pub(crate) fn at_rest(value: f64, keep_s: f64) -> Self {
         let mut knots = VecDeque::with_capacity(64);
         knots.push_back(Knot {
@@ -42,7 +42,7 @@ impl Waveform {
         }
     }
 
-    /// Continues the signal in a straight line to `value` at `t`.
+    /// Continues the signal linearly to `value` at `t`.
     pub(crate) fn line_to(&mut self, t: f64, value: f64) {
         self.knots.push_back(Knot {
             t,
@@ -59,14 +59,14 @@ impl Waveform {
         }
     }
 
-    /// Lets the signal jump to `value` at the time of the newest knot.
+    /// Adds a jump of the signal to `value` at the time of the newest knot.
     pub(crate) fn jump_to(&mut self, value: f64) {
         if let Some(last) = self.knots.back_mut() {
             last.right = value;
         }
     }
 
-    /// Index of the last knot at or before `t` (the first one when `t` precedes all).
+    /// Index of the last knot at or before `t` (the first one if `t` precedes all).
     fn seek(&self, t: f64, cursor: &mut Cursor) -> usize {
         let last = self.knots.len().saturating_sub(1);
         let mut i = cursor.0.saturating_sub(self.forgotten).min(last);

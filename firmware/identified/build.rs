@@ -1,7 +1,6 @@
-//! Makes a module of every generated file in the folder that the variable
-//! `IDENTIFIED` names; if it names none, in `generated`. The rig's constants,
-//! `rig.rs`, are a module of their own; where the folder has none those in
-//! `generated` count.
+//! Makes a module of every generated file in the folder that the variable `IDENTIFIED` names, or in `generated` if
+//! it names none. The rig's constants, `rig.rs`, are a separate module; if the folder has none, those in
+//! `generated` are used.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -21,7 +20,7 @@ fn main() {
     }
 }
 
-/// The modules, what the boards run, and a macro over all.
+/// The modules, the model of the boards, and a macro over all.
 fn modules(folder: &Path, own: &Path) -> Result<String, String> {
     let entries = std::fs::read_dir(folder).map_err(|error| error.to_string())?;
     let mut files: Vec<PathBuf> = entries

@@ -84,7 +84,7 @@ pub enum Command {
 /// Collects a line.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Console {
-    /// One byte longer than the longest command; longer input is no command.
+    /// One byte longer than the longest command; longer input is not a command.
     line: Vec<u8, 7>,
 }
 
@@ -285,7 +285,7 @@ mod tests {
             }
             lines
         };
-        // One for the change of mode, the others periodic: ten a second at any sample period.
+        // One for the change of mode; the others are periodic, ten per second at any sample period.
         assert_eq!(
             [200, 1000, 10_000, 100_000].map(&mut lines),
             [1, 3, 25, 250]

@@ -39,7 +39,7 @@ pub struct Settings {
     pub residual_envelope: f32,
 }
 
-/// Fewest equal readings that count as a stuck sensor: at long periods some are equal by chance.
+/// Fewest equal readings that count as a stuck sensor: at long periods some readings are equal accidentally.
 const FEWEST_EQUAL: u32 = 20;
 
 impl Settings {
@@ -108,7 +108,7 @@ pub struct Controller<L> {
     /// Monitor of the measured channel.
     channel: Watch,
     mode: Mode,
-    /// Samples since the start; 2⁶⁴ of them do not come.
+    /// Samples since the start; a 64-bit counter does not overflow in practice.
     samples: u64,
     /// Low-pass-filtered residual.
     strayed: f32,

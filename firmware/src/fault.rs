@@ -20,7 +20,7 @@ pub enum Fault {
     Link,
     /// The watchdog restarted the board.
     Watchdog,
-    /// The constants or the model's golden run differ from the generated ones.
+    /// The constants or the model's reference run differ from the generated ones.
     SelfTest,
     /// A host set the running law to a value outside its bounds.
     Setting,

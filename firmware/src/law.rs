@@ -103,7 +103,7 @@ pub trait Designed<M: Parts<f32>, Y: Memory<f32>, J: Memory<f32>, const A: usize
         Err(Unchanged::NoSetting)
     }
 
-    /// Whether the law reproduces its golden run.
+    /// Whether the law reproduces its reference run.
     fn holds(
         &self,
         golden: &GoldenLaw,

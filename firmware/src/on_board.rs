@@ -41,9 +41,8 @@ pub const PATIENCE_US: u32 = if PERIOD_US > 5000 {
     20_000
 };
 
-/// What the loop may take of the boards' 128 KiB of RAM, bytes: there may be a copy of
-/// it while it is built, and as much again for the self-test, and 8 KiB are for log,
-/// serial line and calls.
+/// RAM that the loop may use of the boards' 128 KiB, bytes. There may be a copy of it while it is built, and one
+/// more for the self-test; 8 KiB remain for log, serial line and calls.
 pub const MOST: usize = (128 - 8) * 1024 / 4;
 
 // `host-fit codegen --board` reports the same with the key of the model file.

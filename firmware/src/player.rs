@@ -24,7 +24,7 @@ pub struct Player {
     left: u32,
     /// Repeats to come after this one.
     repeats: u32,
-    /// Samples to wait, shut, before the first.
+    /// Samples to wait before the first one, with the valve closed.
     wait: u32,
 }
 

@@ -52,7 +52,7 @@ impl<M: Parts<f32>, Y: Memory<f32>, J: Memory<f32>, const A: usize> Designed<M, 
         0.5 * (self.opens_below + self.shuts_above)
     }
 
-    /// Nothing to check: it is not generated.
+    /// It has no constants to check, because it is not generated.
     fn holds(
         &self,
         _golden: &GoldenLaw,

@@ -34,8 +34,8 @@ pub struct Range {
     pub lower_rail: f32,
     /// Readings at or above it are at the upper rail, counts.
     pub upper_rail: f32,
-    /// Equal readings in a row that count as a stuck sensor: noise changes a healthy reading by a count now
-    /// and then.
+    /// Equal readings in a row that count as a stuck sensor: noise changes a healthy reading by a count from time
+    /// to time.
     pub stuck_after: u32,
 }
 

@@ -14,13 +14,13 @@ use model_core::self_test::{Golden, checksum};
 pub enum Failure {
     /// Structure and coefficients differ from the generated ones.
     Checksum,
-    /// The model does not reproduce its golden run.
+    /// The model does not reproduce its reference run.
     Golden,
-    /// The law does not reproduce its golden run.
+    /// The law does not reproduce its reference run.
     Law,
 }
 
-/// Compares the constants' checksum and runs the golden trajectory.
+/// Compares the constants' checksum and runs the reference trajectory.
 ///
 /// # Errors
 /// The failed test.

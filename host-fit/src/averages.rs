@@ -1,4 +1,4 @@
-//! Moving averages of whole records, eqs. (1), (12) and (13), summed as the model's core sums them.
+//! Moving averages of whole records, eqs. (1), (12) and (13), summed in the same order as in `model-core`.
 
 use model_core::average::WindowSum;
 

@@ -1,7 +1,7 @@
 //! Forward-mode derivatives: numbers that carry partial derivatives.
 //!
-//! Running `model-core` in [`Dual`] gives exact sensitivities of a free run
-//! from the very code that runs on the board.
+//! Running `model-core` in [`Dual`] gives exact sensitivities of a free run from the same code that runs on the
+//! board.
 
 #![allow(
     clippy::needless_range_loop,
@@ -12,11 +12,11 @@ use model_core::Real;
 use std::cmp::Ordering;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-/// A value and its derivatives with respect to `N` − 1 parameters, in `N` lanes of which the first holds the value: every
-/// operation then does the same in all lanes, and compiles into whole vectors where `N` is a multiple of 4.
+/// A value and its derivatives with respect to `N` − 1 parameters, in `N` lanes of which the first holds the value.
+/// Every operation does the same in all lanes, so it compiles to vector instructions if `N` is a multiple of 4.
 ///
-/// Ordering looks at the value alone; equality at everything, so that a zero that still depends on a parameter is not taken
-/// for nothing.
+/// Ordering compares the values only. Equality compares values and derivatives, so a zero that depends on a
+/// parameter is not removed as a zero.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(32))]
 pub struct Dual<const N: usize> {
@@ -180,7 +180,7 @@ impl<const N: usize> Real for Dual<N> {
     #[inline(always)]
     fn sqrt(self) -> Self {
         let value = Real::sqrt(self.lanes[0]);
-        // At 0 the slope is infinite; 0 keeps a search from running away.
+        // At 0 the slope is infinite; a slope of 0 keeps a search from diverging.
         self.chain(value, if value > 0.0 { 0.5 / value } else { 0.0 })
     }
     #[inline(always)]
@@ -195,7 +195,7 @@ impl<const N: usize> Real for Dual<N> {
     }
     #[inline(always)]
     fn two_sum(self, term: Self) -> (Self, Self) {
-        // Derivatives are not summed for ever: their rounding is left as it is.
+        // Derivatives are not summed over long times, so their rounding is not compensated.
         let (_, error) = self.lanes[0].two_sum(term.lanes[0]);
         (self + term, Self::constant(error))
     }

@@ -133,7 +133,7 @@ pub struct Excitation {
     pub lags_separated: usize,
     /// Condition number of that covariance, capped at 1e16.
     pub condition: f64,
-    /// Remarks for the user, worst first.
+    /// Remarks for the user, most severe first.
     pub remarks: Vec<String>,
 }
 
@@ -152,7 +152,8 @@ fn too_few(changes: usize, on_off: bool) -> Option<String> {
     let times = if changes == 1 { "time" } else { "times" };
     (changes < RULES.fewest_edges).then(|| {
         format!(
-            "The command {does} only {changes} {times}: a delay and time constants are identifiable, but not how they depend on y."
+            "The command {does} only {changes} {times}: a delay and time constants are identifiable, but not \
+                 their dependence on y."
         )
     })
 }
@@ -230,12 +231,14 @@ impl Excitation {
             && self.distinct_off_times <= 1
         {
             remarks.push(
-                "All on-times are equal and all off-times are equal: a slow effect (droop, drift, hysteresis) is not identifiable beside the response itself. Add a record with other times.".into(),
+                "All on-times are equal and all off-times are equal: a slow effect (droop, drift, hysteresis) \
+                     is not distinguishable from the response itself. Add a record with other times.".into(),
             );
         }
         if (self.lags_separated as f64) < RULES.separated * self.lags_tried as f64 {
             remarks.push(format!(
-                "Of {} input delays spread over the given lags, the commands distinguish about {}: more input delays than that over-fit.",
+                "Of {} input delays spread over the given lags, the commands distinguish about {}: more input \
+                     delays over-fit.",
                 self.lags_tried, self.lags_separated
             ));
         }

@@ -36,7 +36,7 @@ pub enum ExtendError {
     },
     /// The effect is in the model, or was named twice.
     #[error(
-        "effect `{0}` is in the model already; each effect can be there once. Leave out this `--effect`."
+        "effect `{0}` is in the model already; each effect can be in it once. Leave out this `--effect`."
     )]
     Doubled(String),
     /// No record to refit on.
@@ -122,7 +122,7 @@ pub fn effects_for(model: &Model, names: &[String]) -> Result<Vec<&'static Spec>
 }
 
 /// Adds the effects `names` to `model` and refits all parameters to the identify records among `records` (see
-/// [`Model::targets`] for the model's view of them).
+/// [`Model::targets`]).
 ///
 /// # Errors
 /// [`ExtendError`]; a missing channel is named, not guessed. `interrupt` is checked between fits.

@@ -129,8 +129,7 @@ pub struct Scores {
 }
 
 impl Scores {
-    /// The validation indicators, or those of the identify records where nothing
-    /// was held out.
+    /// The validation indicators, or those of the identify records if there are no validation records.
     #[must_use]
     pub fn held_out(&self) -> Option<&Indicators> {
         self.validate.as_ref().or(self.identify.as_ref())
@@ -164,8 +163,8 @@ pub fn score(model: &Model, records: &[Record]) -> Result<(Scores, Vec<Vec<f64>>
     score_with(model, records, |_, error| Err(error))
 }
 
-/// As [`score`], for a model that nobody has run free yet: a record whose free
-/// run diverges has indicators that are not numbers. Also says of which that is true.
+/// As [`score`], for a model whose free runs may diverge: the indicators of such a record are NaN. The records that
+/// diverge are returned too.
 ///
 /// # Errors
 /// A missing channel.

@@ -1,7 +1,8 @@
 //! From recordings of an on/off actuator and a sensor to a model with delayed inputs, to the physical effect that it
 //! lacks, to a control law and to Rust constants for a microcontroller.
 //!
-//! [`steps`] has the whole way, one function per step; each gives plain data that serialise to what the program prints:
+//! [`steps`] contains the workflow, one function per step; each returns plain data that serialise to the program's
+//! JSON output:
 //!
 //! ```no_run
 //! use host_fit::data::DataSet;
@@ -24,26 +25,26 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! The rooms, from top to bottom; each knows only those below it:
+//! The rooms, from top to bottom; each uses only those below it:
 //!
 //! | room | does |
 //! |---|---|
-//! | [`steps`] | the way, step by step, with the results as data |
-//! | [`codegen`], [`design`], [`extend`] | what is done with a model |
-//! | [`diagnose`], [`power`] | which effect is missing, and how sure that is; how large one would have to be to be named |
-//! | [`discover`] | the term that is missing where no catalogue has it |
-//! | [`terms`] | one search over lags, the sensor's zero and effects |
-//! | [`experiment`], [`residual`] | what would tell models apart, where a model fails |
+//! | [`steps`] | the workflow, step by step, with the results as data |
+//! | [`codegen`], [`design`], [`extend`] | uses of a model: code generation, control laws, added effects |
+//! | [`diagnose`], [`power`] | which effect is missing, with its confidence; the detectable size of an effect |
+//! | [`discover`] | a missing term that is not in the catalogue |
+//! | [`terms`] | one search over lags, the sensor's offset and effects |
+//! | [`experiment`], [`residual`] | the command that distinguishes models best; where a model fails |
 //! | [`analysis`] | residual correlations and spectrum, step responses, poles |
 //! | [`preparation`] | how records begin, where they rest, which samples are scored |
-//! | [`identify`], [`delay`], [`excitation`] | what is done with recordings |
+//! | [`identify`], [`delay`], [`excitation`] | structure and coefficients, measured delays, and excitation of recordings |
 //! | [`fit`], [`search`] | parameters by Levenberg–Marquardt on the free run, delays by mesh-adaptive direct search |
-//! | [`indicators`], [`simulate`], [`target`] | a model run over records, and judged |
+//! | [`indicators`], [`simulate`], [`target`] | free runs over records, and their errors |
 //! | [`baseline`] | usual linear models of the same records: first and second order with dead time, ARX(2,2) |
-//! | [`noise`] | the noise model: what errors are white in |
+//! | [`noise`] | the noise model, which whitens the errors |
 //! | [`model`], [`user_effect`] | a model and its file; effects that users define |
-//! | [`picture`] | drawings and pages of plain numbers |
-//! | [`averages`], [`dual`], [`data`], [`output`], [`mod@rules`] | moving averages, derivatives, recordings, files that appear whole or not at all, what a threshold is |
+//! | [`picture`] | drawings and pages made of plain numbers |
+//! | [`averages`], [`dual`], [`data`], [`output`], [`mod@rules`] | moving averages, derivatives, recordings, atomic output files, thresholds |
 
 pub mod analysis;
 pub mod averages;

@@ -22,7 +22,7 @@ struct Cli {
     /// Print one JSON document on standard output and nothing else.
     #[arg(long, global = true)]
     json: bool,
-    /// Memory that may be used for what a file or an option sizes, in GB.
+    /// Memory limit for data whose size a file or an option determines, in GB.
     #[arg(long, global = true, value_name = "GB", default_value = "2", value_parser = gigabytes)]
     memory: u64,
     /// Give a rule another value for this run (repeatable); `host-fit rules` lists them.
@@ -55,7 +55,7 @@ enum Command {
     ManPages(commands::man_pages::Args),
 }
 
-/// Bytes of so many GB.
+/// Bytes in this many GB.
 fn gigabytes(text: &str) -> Result<u64, String> {
     match text.parse::<f64>() {
         Ok(gb) if (0.1..=1000.0).contains(&gb) => Ok((gb * 1e9) as u64),
@@ -120,7 +120,7 @@ mod tests {
             panic!("another command");
         };
         assert_eq!(args.effects(), ["my-own"]);
-        // Twenty names would hide what the option is for.
+        // A list of twenty names would hide the purpose of the option.
         let help = Cli::command()
             .find_subcommand_mut("extend")
             .expect("the command")
@@ -129,7 +129,7 @@ mod tests {
         assert!(!help.contains("valve-lag"), "{help}");
     }
 
-    /// And the example is a command line.
+    /// The example is a command line too.
     #[test]
     fn every_command_shows_an_example() {
         let mut program = Cli::command();

@@ -1,7 +1,7 @@
-//! Items in the order of a number of each. The places are sorted, so that one sort serves items of all types: each
-//! other would be 6 KB of code.
+//! Items sorted by a number of each. Only their indices are sorted, so that one compiled sort serves items of all
+//! types; a sort for another type would need 6 kB of code.
 
-/// Sorts from the least number to the largest, in the order of `f64::total_cmp`; equal ones keep their order.
+/// Sorts in ascending order of the numbers (`f64::total_cmp`); equal ones keep their order.
 pub(crate) fn ascending<T>(items: &mut [T], number: impl Fn(&T) -> f64) {
     let mut to = places(&items.iter().map(number).collect::<Vec<_>>());
     for at in 0..to.len() {
@@ -13,12 +13,12 @@ pub(crate) fn ascending<T>(items: &mut [T], number: impl Fn(&T) -> f64) {
     }
 }
 
-/// Sorts from the largest number to the least, in the order of `f64::total_cmp`; equal ones keep their order.
+/// Sorts in descending order of the numbers (`f64::total_cmp`); equal ones keep their order.
 pub(crate) fn descending<T>(items: &mut [T], number: impl Fn(&T) -> f64) {
     ascending(items, |item| -number(item));
 }
 
-/// Where each of `numbers` is when they are sorted.
+/// The indices of `numbers` in ascending order.
 fn places(numbers: &[f64]) -> Vec<usize> {
     let mut sorted: Vec<usize> = (0..numbers.len()).collect();
     sorted.sort_by(|a, b| numbers[*a].total_cmp(&numbers[*b]));

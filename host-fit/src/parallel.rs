@@ -1,20 +1,20 @@
 //! Independent pieces of work on all processors; the only user of rayon's iterators.
 //!
-//! They are compiled once, for a closure behind a reference: for each closure of its own they would be 7 KB of code.
+//! They are compiled once, for a closure behind a reference; a copy for each closure would need 7 kB of code.
 
 use rayon::prelude::*;
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// What can be handed out piece by piece.
+/// A collection whose items can be distributed one by one.
 pub(crate) trait Items {
     type Item;
 
     /// How many there are.
     fn count(&self) -> usize;
 
-    /// The items by their places; each is asked for once.
+    /// The items by their indices; each is requested once.
     fn by_place(self) -> impl Fn(usize) -> Self::Item + Sync;
 }
 
@@ -64,17 +64,21 @@ impl<T: Send> Items for Vec<T> {
     fn by_place(self) -> impl Fn(usize) -> T + Sync {
         let items: Vec<Option<T>> = self.into_iter().map(Some).collect();
         let items = Mutex::new(items);
-        move |place| held(&items)[place].take().expect("each is asked for once")
+        move |place| {
+            held(&items)[place]
+                .take()
+                .expect("each item is requested once")
+        }
     }
 }
 
-/// What `make` gives for each of `items`, in their order.
+/// The results of `make` for each of `items`, in their order.
 pub(crate) fn each<I: Items, T: Send>(items: I, make: impl Fn(I::Item) -> T + Sync) -> Vec<T> {
     let (count, item) = (items.count(), items.by_place());
     gathered(count, &|place| Some(make(item(place))))
 }
 
-/// What `make` gives for those of `items` for which it gives something, in their order.
+/// The results of `make` for each of `items`, in their order, without the `None`s.
 pub(crate) fn some<I: Items, T: Send>(
     items: I,
     make: impl Fn(I::Item) -> Option<T> + Sync,
@@ -83,7 +87,7 @@ pub(crate) fn some<I: Items, T: Send>(
     gathered(count, &|place| make(item(place)))
 }
 
-/// What `make` gives for each of `items`, in their order; after the first `None`, none are begun.
+/// The results of `make` for each of `items`, in their order; after the first `None` no further items are started.
 pub(crate) fn all<I: Items, T: Send>(
     items: I,
     make: impl Fn(I::Item) -> Option<T> + Sync,
@@ -118,13 +122,13 @@ fn gathered<T: Send>(count: usize, make: &(dyn Fn(usize) -> Option<T> + Sync)) -
     places.into_iter().flatten().collect()
 }
 
-/// No work runs under the locks: they are held for a move in memory, and never poisoned.
+/// Locks are held only while a value is moved, so they are never poisoned.
 fn held<T>(items: &Mutex<T>) -> MutexGuard<'_, T> {
     items.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 fn at_once(count: usize, work: &(dyn Fn(usize) + Sync)) {
-    // The pieces are long and differ in length: a free thread takes one at a time.
+    // The pieces of work take long and differ in length, so a free thread takes one at a time.
     let places = (0..count).into_par_iter().with_max_len(1);
     places.for_each(work);
 }

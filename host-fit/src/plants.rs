@@ -1,8 +1,7 @@
 //! Stress trials of a law on simulated plants: the continuous-time plant nearest to the model, that plant
 //! with each effect of the catalogue at its usual strength, and under conditions beyond the design.
 //!
-//! The plants are not part of the library, because a fit must not be tested by a simulator that it depends
-//! on.
+//! The plants are not part of the library: a fit must not be tested with a simulator on which it depends.
 //!
 //! The simulator runs at 1 ms per sample. A model of another period is converted to that clock with all its
 //! times, and its plant runs at the model's own period: the plant of a model at 100 ms is a hundred times
@@ -134,7 +133,7 @@ fn nearest_plant(model: &Model) -> anyhow::Result<(PlantSpec, Vec<String>)> {
     Ok((PlantSpec::new(base, &effects), left_out))
 }
 
-/// The law in continuous time; if the simulator lacks it, the longest of its delays.
+/// The law in continuous time; if the simulator does not have it, a constant delay, the longest of the law's.
 fn transport(law: &TransportLaw, period: f64) -> FlowDelay {
     let factor = law.factors.iter().copied().fold(f64::INFINITY, f64::min);
     let known = physical_effect(law.spec.name, &law.parameters).ok();
@@ -184,7 +183,7 @@ impl Circumstances {
         SAMPLE_PERIOD_S * self.units.time
     }
 
-    /// Length of a run of so many samples at the model's period.
+    /// Length of a run of this many samples at the model's period.
     fn span(&self, samples: usize) -> usize {
         span(samples, self.sample_period_s())
     }
@@ -375,7 +374,7 @@ mod tests {
         clock.model_out(&model)
     }
 
-    /// t → c·t: the law is the same, and so are its results, with times multiplied by c.
+    /// t → c·t: the law is the same, and its results are the same with all times multiplied by c.
     #[test]
     fn a_slower_clock_changes_times_and_nothing_else() {
         let near = |a: f64, b: f64| (a - b).abs() <= 1e-6 * a.abs().max(1e-3);

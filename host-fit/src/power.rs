@@ -1,11 +1,11 @@
 //! Detectable effect sizes: the amplitude at which the diagnosis of these records would name each effect in
 //! 80 % of cases.
 //!
-//! The amplitude is limited by what the base model can imitate. From the effect's change of the free run, the
-//! part is subtracted that the model's own parameters can follow, and further lags and unnamed terms as long
-//! as each pays for its parameters. The rest must exceed the practical margin and be significant over all
-//! candidates. A gain x²·‖z‖² has the standard deviation 2x·S, with S² = Σ (z·e)² over blocks longer than the
-//! correlation time of the error e; the threshold must be passed by 0.84 of that.
+//! The amplitude is limited by what the base model can imitate. The part of the effect's change of the free run
+//! that the model's own parameters can follow is subtracted. So are further lags and unnamed terms, as long as each
+//! lowers the error by more than its parameters cost. The remaining part must exceed the practical margin and be
+//! significant over all candidates. A gain x²·‖z‖² has the standard deviation 2x·S, with S² = Σ (z·e)² over blocks
+//! longer than the correlation time of the error e. The threshold must be exceeded by 0.84 of that.
 
 use crate::data::Record;
 use crate::diagnose::RULES as NAMED;
@@ -34,7 +34,8 @@ rules! {
     /// Penalty of each of those terms, in parameters.
     term_cost: f64 = 2.0, "parameters", "a lag and its weight";
     /// Factor on the first-order detectable amplitude, because a search that moves all lags imitates more.
-    margin: f64 = 2.0, "times the amplitude", "`cargo xtask calibrate`: 13 of 37 were named without it, 9 of 15 with it before pairs of lags counted as one term";
+    margin: f64 = 2.0, "times the amplitude", "`cargo xtask calibrate`: without it 13 of 37 were named, with \
+         it and before pairs 9 of 15";
     /// Iterations for an effect that is not linear in its amplitude.
     probes: usize = 4, "", "judgement";
 }
@@ -95,8 +96,9 @@ struct Asked {
 
 impl Asked {
     fn of(judge: &Judge, given: &Model, held_out: &HeldOut) -> Self {
-        // The effect pays for the level, for the models that are tried, and for the coefficients of the model without it, all
-        // of which move to imitate it. An amplitude t standard deviations from 0 gains t²/2 nats, with standard deviation t.
+        // The effect must exceed the price of the test's level, of the number of models tried, and of the
+        // coefficients of the model without it, because all of these coefficients change to imitate the effect. An
+        // amplitude t standard deviations from 0 has an evidence of t²/2 nats, with standard deviation t.
         let likely = MostLikely::of(judge, given);
         let prior = likely.and_then(|likely| Some(likely.log_likelihood - likely.evidence(judge)?));
         let nats = prior.unwrap_or(0.0) - NAMED.level_of_search.ln() + (SPECS.len() as f64).ln();
@@ -122,9 +124,9 @@ impl Asked {
         (scatter + wanted.sqrt()).max(self.deviations * left.deviation) / left.energy
     }
 
-    /// The factor on the amplitude at which the effect is detected: `margin` times the one that passes beside
-    /// as many unnamed terms as pay. A term may pay only together with the next: two neighbouring lags make
-    /// an echo.
+    /// The factor on the amplitude at which the effect is detected: `margin` times the factor that passes with as
+    /// many unnamed terms in the model as lower the error enough. A single term may not do so although a pair does:
+    /// two neighbouring lags imitate an echo.
     fn multiple(&self, shown: &Shown) -> f64 {
         let (mut x, mut beside) = (0.0_f64, 0);
         while let Some(left) = shown.beside.get(beside) {

@@ -16,25 +16,25 @@ use rig_line::{Host, LineError, Port};
 /// Which board.
 #[derive(Debug, Clone, clap::Args)]
 pub(crate) struct PortArgs {
-    /// Serial port of the board, or `qemu`: a board under QEMU with a simulated rig behind it, which is as much slower as
-    /// the board's period is longer than 1 ms.
+    /// Serial port of the board, or `qemu`: a board under QEMU with a simulated rig. If the board's period is
+    /// longer than 1 ms, the rig is slower by the same factor.
     #[arg(long, value_name = "PATH|qemu")]
     port: PathBuf,
     /// With `--port qemu`: the board's program, as `cargo xtask firmware --board qemu-rig` builds it.
     #[arg(long, value_name = "ELF")]
     firmware: Option<PathBuf>,
-    /// With `--port qemu`: an effect that the simulated rig has; repeatable.
+    /// With `--port qemu`: an effect of the simulated rig; repeatable.
     #[arg(long, value_name = "EFFECT")]
     rig_effect: Vec<String>,
     /// With `--port qemu`: which simulated rig.
     #[arg(long, value_name = "SEED", default_value_t = 1)]
     rig_seed: u64,
-    /// With `--port qemu`: which noise it has.
+    /// With `--port qemu`: the kind of noise.
     #[arg(long, value_name = "SEED", default_value_t = 1)]
     noise_seed: u64,
 }
 
-/// A board on the line; it ends with this.
+/// A board on the line; dropping it ends the emulator.
 pub(crate) struct Connected {
     /// The host's end.
     pub(crate) host: Host,
@@ -71,7 +71,7 @@ impl PortArgs {
 }
 
 impl Connected {
-    /// The host, and how to find the board again after the line broke.
+    /// The host, and the data to reconnect to the board after the line broke.
     pub(crate) fn ends(&mut self) -> (&mut Host, impl FnMut() -> Result<Host, LineError> + use<>) {
         let port = self.port.clone();
         (&mut self.host, move || open(&port, None))
@@ -82,16 +82,16 @@ fn open(device: &Path, pace: Option<Pace>) -> Result<Host, LineError> {
     Ok(Host::new(Port::serial(device)?, session(), pace))
 }
 
-/// A number that no other host has; 0 is nobody's.
+/// A number that identifies this host; 0 means no host.
 fn session() -> u32 {
-    // The standard library draws its keys at random.
+    // The standard library seeds its hash keys at random.
     (RandomState::new().build_hasher().finish() as u32).max(1)
 }
 
 /// A simulated rig as the board's converter sees it: y from −1 to 3 over the
 /// range of the sensor's input, the free stream from 0 to 20 m/s over the channel's.
 ///
-/// The simulator's millisecond is a sample of the board: to a board at 10 ms the rig is ten times as slow.
+/// One millisecond of the simulator is one sample of the board: for a board at 10 ms the rig is ten times slower.
 struct Simulated {
     rig: Rig,
     noise: NoiseSignal,
@@ -104,7 +104,7 @@ impl Simulated {
     fn new(effects: &[String], seed: u64, noise_seed: u64) -> anyhow::Result<Self> {
         let names: Vec<&str> = effects.iter().map(String::as_str).collect();
         let plan = HiddenSetPlan::draw(&names, &[], seed)?;
-        // As long as a day: its mean does not depend on how long it is watched.
+        // The record is as long as a day, so its mean does not depend on the length of the observation.
         let stream = FreeStream::draw(&mut ChaCha8Rng::seed_from_u64(seed), 1_000_000);
         let wanders = plan.plant.effects.iter().any(|e| e.channel().is_some());
         let mut rng = ChaCha8Rng::seed_from_u64(noise_seed);

@@ -1,22 +1,22 @@
-//! What the host remembers of a signal.
+//! The stored past of a signal on the host.
 
 use model_core::Real;
 use model_core::history::{Memory, Past, Reaching};
 
-/// A ring buffer with a size chosen at run time: the host's counterpart of
-/// `model_core::history::DelayLine`. It knows where its signal changed last, so that a delay
-/// law need not be asked while what it could point at is all the same.
+/// A ring buffer with a size chosen at run time: the host's counterpart of `model_core::history::DelayLine`. It
+/// stores when its signal last changed. A delay law is not evaluated if the signal is constant over all its
+/// possible delays.
 #[derive(Clone, Debug)]
 pub struct Ring<T> {
     samples: Vec<T>,
     newest: usize,
     /// Samples that were pushed.
     count: i64,
-    /// Which of them differed from the one before, the last ones first.
+    /// Flags of the samples that differ from the preceding one, newest first.
     changes: [i64; CHANGES],
 }
 
-/// Changes that are remembered: jets switch a few times within a delay at most.
+/// Number of stored changes: jets switch only a few times within a delay.
 const CHANGES: usize = 4;
 
 impl<T: Real> Reaching<T> for Ring<T> {

@@ -18,7 +18,7 @@ rules! {
     pub struct Rules in "simulate";
 
     /// A flow beyond this has diverged.
-    diverged: f64 = 1e3, "times the largest |y|", "judgement: far above any swing from which a stable run returns";
+    diverged: f64 = 1e3, "times the largest |y|", "judgement: far above any oscillation of a stable run";
 }
 
 /// Memory for a delay law that a search varies, samples.
@@ -167,7 +167,7 @@ impl<T: Real> Simulator<T> {
         }
     }
 
-    /// Free run over `signals`; every sample is passed to `sink` until it breaks off.
+    /// Free run over `signals`; every sample is passed to `sink` until the run ends or diverges.
     ///
     /// Returns the sample of divergence, if any.
     pub fn run(
@@ -197,7 +197,7 @@ impl<T: Real> Simulator<T> {
         if begins && first.is_none() {
             self.settle(signals, &mut state, &mut channels);
         }
-        // What is held before the record runs through the same loop.
+        // The samples before the record, with a constant command, run through the same loop.
         let held = first.map_or(0, |_| self.samples_held());
         let (before, y) = first.unwrap_or((0.0, T::ZERO));
         let (before, y) = (std::iter::repeat_n(before, held), y - self.zero);
@@ -255,7 +255,7 @@ impl<T: Real> Simulator<T> {
         self.memory.at_rest(&self.prepared)
     }
 
-    /// Makes `flow` the newest output; the average is updated if something reads it.
+    /// Stores `flow` as the newest output; the average is updated if an effect or the delay law reads it.
     #[inline(always)]
     fn advance(&self, state: &mut HostState<T>, flow: T, window: u32) {
         if self.prepared.follows_average() {
@@ -291,7 +291,7 @@ impl<T: Real> Simulator<T> {
             || signals.u_before.is_some_and(|u| u != 0.0)
     }
 
-    /// [`observe`](Self::observe) as a function of its own, for runs that need not be fast.
+    /// [`observe`](Self::observe) as a separate function, for runs that need not be fast.
     #[inline(never)]
     fn observe_apart(
         &self,
@@ -304,7 +304,7 @@ impl<T: Real> Simulator<T> {
         self.observe(signals, state, channels, k, u)
     }
 
-    /// Command and measured output that are held before the first sample, if they are known.
+    /// Command and measured output that are held constant before the first sample, if they are known.
     fn held(&self, signals: &Signals<'_>) -> Option<(f64, T)> {
         let u = signals.u_before.or(signals.u.first().copied())?;
         let y = signals
@@ -314,7 +314,7 @@ impl<T: Real> Simulator<T> {
         Some((u, T::from_f64(y)))
     }
 
-    /// How long they are held: until the memories are filled.
+    /// How long they are held constant: until the memories are filled.
     fn samples_held(&self) -> usize {
         self.memory.outputs.max(self.memory.jets).max(self.fades)
     }

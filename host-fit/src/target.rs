@@ -1,19 +1,17 @@
-//! What a model's free run is compared with.
+//! The signal with which a model's free run is compared.
 //!
-//! A full model imitates y; an averaged model imitates y_avg, eq. (12). The
-//! command stays as recorded: an averaged model forms u_avg, eq. (13), itself.
+//! A full model reproduces y; an averaged model reproduces y_avg, eq. (12). The command stays as recorded, because
+//! an averaged model forms u_avg, eq. (13), itself.
 
 use crate::averages::moving_average;
 use crate::data::Record;
 use crate::model::{Model, Start};
 
 impl Model {
-    /// The records as this model sees them: as they are for a full model, with
-    /// y_avg in place of y for an averaged one.
+    /// The records for this model: unchanged for a full model, with y_avg instead of y for an averaged one.
     ///
-    /// The averages of `y_sd` and of the envelope are left out: how much an
-    /// average scatters depends on how the scatter is correlated in time,
-    /// which a standard error per sample does not say.
+    /// The averages of `y_sd` and of the envelope are left out: the scatter of an average depends on the
+    /// autocorrelation of the noise, which a standard error per sample does not contain.
     #[must_use]
     pub fn targets(&self, records: &[Record]) -> Vec<Record> {
         if !self.averaging.averaged_model {

@@ -1,5 +1,5 @@
-//! Whatever bytes a user's files hold, loading ends in data that keep their promises or in one paragraph that names
-//! the file; never in a panic, never with half an output.
+//! Whatever bytes a user's files contain, loading ends in valid data or in an error of one paragraph that names the
+//! file. It never panics and never leaves a partial output.
 
 use std::fs;
 use std::path::Path;
@@ -82,7 +82,8 @@ fn mutate(text: &str, mutations: &[Mutation]) -> Vec<u8> {
     bytes
 }
 
-/// Loads the folder (or file): either every promise holds, or the message is one paragraph that names a file of it.
+/// Loads the folder (or file): either the data are valid, or the message is one paragraph that names one of its
+/// files.
 fn judge(path: &Path, names: &[&str]) {
     match DataSet::load(path) {
         Ok(set) => {
@@ -217,7 +218,8 @@ fn the_program_exits_1_on_bad_data_2_on_bad_usage_and_leaves_nothing() {
     }
 }
 
-/// A data set is not replaced unasked, files of other programs name the import, and no cause is said twice.
+/// A data set is not replaced without `--force`, errors on files of other programs mention `import`, and no cause
+/// is reported twice.
 #[test]
 fn imports_replace_nothing_unasked_and_are_named_where_they_are_needed() {
     let folder = tempfile::tempdir().unwrap();
@@ -241,7 +243,7 @@ fn imports_replace_nothing_unasked_and_are_named_where_they_are_needed() {
     let (code, _, stderr) = host_fit(&import);
     assert_eq!(code, Some(1));
     assert!(
-        stderr.contains("set: holds a data set already") && stderr.contains("--force"),
+        stderr.contains("set: contains a data set already") && stderr.contains("--force"),
         "{stderr}"
     );
     let (code, stdout, _) = host_fit(&[&import[..], &["--force", "--json"]].concat());
@@ -270,7 +272,7 @@ fn imports_replace_nothing_unasked_and_are_named_where_they_are_needed() {
     assert_eq!(stderr.matches("os error 2").count(), 1, "{stderr}");
 }
 
-/// Records that say too little are refused with the file they are in, and a slip of an on/off command with its line.
+/// Records with too little data are refused with their file, and a wrong value of an on/off command with its line.
 #[test]
 fn what_a_fit_cannot_use_is_refused_with_its_file() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,5 +1,5 @@
-//! What is written can be read again and means the same: models with any numbers and names that a file may hold, the Rust
-//! that is generated of them, data sets.
+//! Written files can be read again with the same meaning: models with any valid numbers and names, the Rust
+//! generated from them, data sets.
 
 use host_fit::codegen;
 use host_fit::data::{DataSet, Record, Use, visible};
@@ -8,7 +8,7 @@ use model_core::control::HoldTimes;
 use model_core::effects::StateDependentDelay;
 use proptest::prelude::*;
 
-/// Any text; often one of what acts on a terminal, ends a line or a comment.
+/// Any text; often with characters that control a terminal or end a line or a comment.
 fn text() -> impl Strategy<Value = String> {
     let acting = prop::sample::select(vec![
         "\r",
@@ -31,7 +31,7 @@ fn text() -> impl Strategy<Value = String> {
     .prop_map(|parts| parts.concat())
 }
 
-/// Numbers of every size, and what is none.
+/// Numbers of every size, and NaN and infinity.
 fn number() -> impl Strategy<Value = f64> {
     prop_oneof![
         4 => -2.0..2.0f64,
@@ -140,7 +140,7 @@ fn model() -> impl Strategy<Value = Model> {
         )
 }
 
-/// Whether the file holds NaN, which differs from itself.
+/// Whether the file contains NaN, which is not equal to itself.
 fn is_equal(a: &Model, b: &Model) -> bool {
     a == b || a.to_toml() == b.to_toml()
 }
@@ -148,8 +148,8 @@ fn is_equal(a: &Model, b: &Model) -> bool {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(2000))]
 
-    /// A file is refused with its key, or it is the model again; and its Rust has nothing that cannot be seen, no number that
-    /// is none, and is Rust.
+    /// A file is refused with its key, or it gives the same model again. Its Rust then has no invisible characters
+    /// and only finite numbers, and it parses.
     #[test]
     fn a_model_is_refused_or_survives_and_its_rust_compiles(model in model()) {
         let text = model.to_toml();
@@ -162,7 +162,7 @@ proptest! {
             }
         };
         prop_assert!(is_equal(&read, &model), "{text}");
-        // Long golden runs of long memories take their time.
+        // Long reference runs of long memories are slow.
         if read.longest_lag().max(read.longest_delay()) > 2000 {
             return Ok(());
         }
@@ -180,7 +180,7 @@ proptest! {
         }
     }
 
-    /// A data set is refused when it is put together, or it is saved and is the same when it is loaded.
+    /// A data set is refused when it is assembled, or it is saved and is the same when it is loaded.
     #[test]
     fn a_data_set_is_refused_or_survives(
         names in prop::collection::vec(text(), 2),

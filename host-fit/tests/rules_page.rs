@@ -1,4 +1,5 @@
-//! The pages of rules are what the code says: `BLESS=1 cargo test --release -p host-fit --test rules_page` writes them anew.
+//! The pages of rules equal the code: `BLESS=1 cargo test --release -p host-fit --test rules_page` regenerates
+//! them.
 
 use std::path::Path;
 

@@ -1,8 +1,8 @@
 //! Moving averages without accumulating rounding errors.
 //!
 //! A running sum in floating point drifts without bound. Here the sum of every block of a window's length is
-//! computed afresh and replaces the running one; both are kept in two words. After any number of samples the
-//! error is below that of summing the present window once, even after much larger values have left it.
+//! computed anew and replaces the running one; both are stored in two words. After any number of samples the error
+//! is below that of summing the present window once, even after much larger values have left it.
 
 use crate::history::{DelayLine, Memory, Past};
 use crate::real::Real;
@@ -105,7 +105,7 @@ impl<T: Real, const W: usize> MovingAverage<T, W> {
         }
     }
 
-    /// Takes the sample x_k and returns the average up to and with it.
+    /// Adds the sample x_k and returns the average up to and including it.
     pub fn push(&mut self, sample: T) -> T {
         let leaving = self.line.back(W - 1);
         self.line.push(sample);

@@ -1,4 +1,4 @@
-//! What generated constants must satisfy, checked while they compile.
+//! Conditions that generated constants must satisfy, checked at compile time.
 
 use crate::control::{HoldTimes, Tracking};
 use crate::recursion::LagConvention;
@@ -16,7 +16,7 @@ pub const fn finite(coefficients: &[f32]) -> bool {
     true
 }
 
-/// Outputs that must be kept for `lags`: one more than the longest reaches back.
+/// Number of outputs to store for `lags`: one more than the longest lag needs.
 #[must_use]
 pub const fn outputs_for(lags: &[u16], convention: LagConvention) -> usize {
     let mut longest = 0;
@@ -59,8 +59,7 @@ pub const fn smallest(values: &[f32]) -> f32 {
     smallest
 }
 
-/// Whether the constants of a tracking law lie in their ranges, its reference
-/// within what can be reached.
+/// Whether the constants of a tracking law are within their ranges, and its reference is reachable.
 #[must_use]
 pub const fn law(law: &Tracking<f32>) -> bool {
     let shares = [law.observer, law.bias_rate, law.integral_rate];
@@ -93,9 +92,8 @@ pub const fn look_ahead<T>(law: &Tracking<T>, delay: usize) -> usize {
     if needed > lead { needed } else { lead }
 }
 
-/// Whether pulses in a period come in order and keep the hold times, from the
-/// last to the first of the next period too; steady blowing is one pulse as long
-/// as the period.
+/// Whether the pulses of a period are in order and keep the hold times, also from the last pulse to the first of
+/// the next period. Steady blowing is one pulse as long as the period.
 #[must_use]
 pub const fn train(period: u32, pulses: &[(u32, u32)], hold: HoldTimes) -> bool {
     if pulses.is_empty() {

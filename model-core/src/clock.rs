@@ -2,11 +2,11 @@
 
 use crate::real::Real;
 
-/// Samples since the last edge when there has been none: 2²⁴, the largest count
-/// that every `f32` below it holds exactly; 4.6 hours at 1 kHz.
+/// Samples since the last edge if there was none: 2²⁴, the largest count up to which `f32` represents every
+/// integer; 4.6 hours at 1 kHz.
 pub const LONG_AGO: u32 = 1 << 24;
 
-/// Counts samples and watches for edges of the command.
+/// Counts samples and detects edges of the command.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Clock<T> {
     lived: u32,
@@ -25,7 +25,7 @@ impl<T: Real> Clock<T> {
         }
     }
 
-    /// Takes a sample in; called once a sample, before the times are read.
+    /// Adds a sample; called once per sample, before the times are read.
     #[inline]
     pub fn tick(&mut self, command: T) {
         self.lived = self.lived.saturating_add(1);
@@ -38,8 +38,7 @@ impl<T: Real> Clock<T> {
         self.command = command;
     }
 
-    /// Time from the record's start, in the unit of `period`; stands still
-    /// after 2³² samples.
+    /// Time from the record's start, in the unit of `period`; constant after 2³² samples.
     #[inline]
     pub fn time(&self, period: T) -> T {
         T::from_count(self.lived.saturating_sub(1)) * period

@@ -1,4 +1,4 @@
-//! The transport delay between jets and sensor: which past jet strength acts on the flow now.
+//! The transport delay between jets and sensor: it selects the past jet strength that acts on the flow now.
 
 use crate::history::Past;
 use crate::real::Real;
@@ -57,10 +57,9 @@ impl<T: Real> Tap<T> {
     }
 }
 
-/// A law of the transport from the jets to the flow; each is defined in a file of
-/// [`effects`](crate::effects).
+/// A law of the transport from the jets to the flow; each law is defined in a file of [`effects`](crate::effects).
 ///
-/// It gives the delay of one input; those of a model's inputs are multiples of it, see [`ScaledDelay`].
+/// It gives the delay of one input; the delays of a model's inputs are multiples of it, see [`ScaledDelay`].
 pub trait Transport<T: Real> {
     /// State of the law: its memory of the command.
     type State: Clone;
@@ -78,8 +77,7 @@ pub trait Transport<T: Real> {
     /// samples; below 0 counts as 0.
     fn delay(&self, output: T) -> T;
 
-    /// The shortest and the longest of these delays over all outputs ≥ 0, where
-    /// the law has such bounds.
+    /// The shortest and the longest of these delays over all outputs ≥ 0, if the law has such bounds.
     fn bounds(&self) -> Option<[T; 2]>;
 
     /// Number of samples by which [`command`](Self::command) delays rising and falling edges. A pulse or gap
@@ -119,7 +117,7 @@ pub trait DelayLaw<T: Real> {
         None
     }
 
-    /// The tap of input `l`, from what [`evaluate`](Self::evaluate) gave.
+    /// The tap of input `l`, from the result of [`evaluate`](Self::evaluate).
     fn tap(&self, l: usize, evaluated: T) -> Tap<T>;
 }
 
@@ -139,11 +137,11 @@ impl<T: Real, H: AsRef<[u16]>> DelayLaw<T> for FixedDelay<H> {
     }
 }
 
-/// Delays h_l = f_l · h after a law h, rounded to whole samples as in eq. (4)
-/// where `ROUNDED`, else with the input interpolated between samples.
+/// Delays h_l = f_l · h with the delay h of a law, rounded to whole samples as in eq. (4) if `ROUNDED`, otherwise
+/// with the input interpolated between samples.
 ///
-/// The rounding moves every edge by up to half a sample, which a flow that
-/// rings at 20 Hz shows as an error of several per cent of the ringing.
+/// Rounding moves every edge by up to half a sample. In a flow with an oscillation at 20 Hz this causes an error of
+/// several per cent of the oscillation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ScaledDelay<L, F, const ROUNDED: bool> {
     /// h.
@@ -169,8 +167,8 @@ impl<T: Real, L: Transport<T>, F: AsRef<[T]>, const ROUNDED: bool> DelayLaw<T>
     fn evaluate(&self, output: T) -> T {
         self.law.delay(output)
     }
-    /// A law stays within its bounds, and all further operations are monotonic, roundings included: the taps
-    /// of the bounds are the extremes.
+    /// A law stays within its bounds, and all further operations are monotonic, including rounding. The taps of the
+    /// bounds are therefore the extremes.
     #[inline(always)]
     fn range(&self, l: usize) -> Option<(usize, usize)> {
         if !ROUNDED {

@@ -1,8 +1,7 @@
 //! Models whose constants are part of the code.
 //!
-//! A step reads some twenty lags and as many coefficients. Where they are known
-//! when the program is compiled, lags become offsets and coefficients immediates:
-//! the step then takes a third of the instructions of one that looks them up.
+//! A step reads some twenty lags and as many coefficients. If these are known at compile time, lags become offsets
+//! and coefficients immediates. The step then needs a third of the instructions of one that looks them up.
 
 use crate::effect::Effect;
 use crate::model::{Averaging, Parts};
@@ -10,7 +9,7 @@ use crate::real::Real;
 use crate::recursion::Bilinear;
 use core::marker::PhantomData;
 
-/// A type that stands for the constants of a model; generated files have one.
+/// A type for the constants of a model; generated files contain one.
 pub trait Constants<T: Real> {
     /// Structure, coefficients and delay law; its effects are not used.
     type Base: Parts<T> + 'static;
@@ -18,8 +17,7 @@ pub trait Constants<T: Real> {
     const BASE: &'static Self::Base;
 }
 
-/// The model with the constants `C` and the effects `E`; without effects it takes
-/// no memory.
+/// The model with the constants `C` and the effects `E`; without effects it has no size.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Frozen<C, E = ()> {
     constants: PhantomData<C>,

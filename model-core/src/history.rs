@@ -5,8 +5,8 @@ use crate::real::Real;
 
 /// Reads the past of a signal.
 pub trait Past<T> {
-    /// The value `lag` samples before the newest one; 0 where nothing was
-    /// recorded (the paper's y_j = 0 for j < 0) or the buffer does not reach.
+    /// The value `lag` samples before the newest one; 0 before the first sample (the paper's y_j = 0 for j < 0) or
+    /// beyond the buffer.
     fn back(&self, lag: usize) -> T;
 }
 
@@ -14,16 +14,15 @@ pub trait Past<T> {
 pub trait Memory<T>: Past<T> + Clone {
     /// Appends the newest sample.
     fn push(&mut self, value: T);
-    /// The common value of all samples from lag `from` to lag `to`, if it is cheaply known that they are
-    /// equal.
+    /// The common value of all samples from lag `from` to lag `to`, if their equality can be checked cheaply.
     #[inline]
     fn steady(&self, _from: usize, _to: usize) -> Option<T> {
         None
     }
-    /// How many samples are kept: `back` reaches lags below this.
+    /// Number of stored samples: `back` reaches lags below this.
     fn capacity(&self) -> usize;
-    /// Mean of `window` samples, the newest of them `lag` back: eq. (13) for a delayed input. Costs `window`
-    /// reads by default.
+    /// Mean of `window` samples, the newest of them `lag` back: eq. (13) for a delayed input. By default it costs
+    /// `window` reads.
     fn mean_back(&self, lag: usize, window: u32) -> T
     where
         T: Real,
@@ -36,9 +35,9 @@ pub trait Memory<T>: Past<T> + Clone {
     }
 }
 
-/// A memory that is made to measure, or that has its length from its type.
+/// A memory whose length is chosen at creation or fixed by its type.
 pub trait Reaching<T>: Memory<T> {
-    /// A memory at rest that reaches back `lag` samples, or as far as its type does.
+    /// A memory at rest that reaches back `lag` samples, or as far as its type permits.
     fn reaching(lag: usize) -> Self;
 }
 
@@ -154,7 +153,7 @@ impl<const WORDS: usize> BitHistory<WORDS> {
         }
     }
 
-    /// How many of `window` samples were on, the newest of them `lag` back.
+    /// Number of samples with the command on among `window` samples, the newest of them `lag` back.
     #[must_use]
     pub fn count_on(&self, lag: usize, window: u32) -> u32 {
         if lag >= Self::BITS {
@@ -171,7 +170,7 @@ impl<const WORDS: usize> BitHistory<WORDS> {
             let available = position % 32 + 1;
             let taken = available.min(left);
             let word = self.words.get(position / 32).copied().unwrap_or(0);
-            // The newest bit goes to the top, then all but `taken` fall off below.
+            // The newest bit is shifted to the top; then all but `taken` bits are shifted out.
             let kept = (word << (32 - available)) >> (32 - taken);
             count += kept.count_ones();
             left -= taken;

@@ -7,8 +7,8 @@
 //! those of the paper. [`model::step`] is the whole of it: host, simulation and
 //! firmware call the same function, so equal constants give equal bits.
 //!
-//! The crate is `no_std`, does not allocate, has no unsafe code and cannot
-//! panic. Time, noise and measurements are arguments, never read inside.
+//! The crate is `no_std`, does not allocate, has no unsafe code and cannot panic. Time, noise and measurements are
+//! arguments; they are never read inside.
 #![no_std]
 
 #[cfg(test)]

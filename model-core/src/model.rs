@@ -13,20 +13,19 @@ use nalgebra::{ArrayStorage, SMatrix, SVector};
 pub struct Averaging {
     /// W, samples, at least 2; [`WINDOW`](crate::average::WINDOW) in the paper.
     pub window: u32,
-    /// Full model, eq. (4): the delay follows ỹ of eq. (1), the input is u.
-    /// Averaged model, eq. (15): the delay follows y itself (an average
-    /// already), the input is the mean of u over W samples, eq. (13).
+    /// Full model, eq. (4): the delay depends on ỹ of eq. (1), the input is u. Averaged model, eq. (15): the delay
+    /// depends on y itself (already an average), the input is the mean of u over W samples, eq. (13).
     pub averaged_model: bool,
 }
 
-/// The constant part of a model, as an identification gives it.
+/// The constant part of a model, as the result of an identification.
 ///
 /// Implemented by [`Params`] with sizes known at compile time and by the host with sizes known at run time;
 /// [`step`] is the same function for both.
 pub trait Parts<T: Real> {
     /// The delay law.
     type Delay: DelayLaw<T>;
-    /// The effects, in the order of the physics.
+    /// The effects, in physical order.
     type Effects: Effect<T>;
     /// Structure and coefficients.
     fn recursion(&self) -> Bilinear<'_, T>;
@@ -193,7 +192,7 @@ where
         }
     }
 
-    /// Makes `flow` the newest output s_{k+1}: the prediction of [`step`], or a measurement instead.
+    /// Stores `flow` as the newest output s_{k+1}: the prediction of [`step`], or a measurement.
     #[inline(always)]
     pub fn advance(&mut self, flow: T, window: u32) {
         let terms = window.saturating_sub(1).max(1);
@@ -549,12 +548,12 @@ mod tests {
         for _ in 0..60 {
             last = step(&model, &mut state, &input);
         }
-        // 61 samples on: the first jet has just arrived, while the valve was starting to open.
+        // 61 samples later: the first jet has just arrived, from the time when the valve was starting to open.
         assert!(last.arrived > 0.0 && last.arrived < 0.2);
         for _ in 0..200 {
             last = step(&model, &mut state, &input);
         }
-        // The valve is open by now; the film lags a rising friction by 50 ms.
+        // The valve is open by then; the film lags a rising friction by 50 ms.
         assert!((last.arrived - 1.0).abs() < 1e-6);
         let trailing = (last.flow - last.measured) / (last.next - last.flow);
         assert!((40.0..80.0).contains(&trailing), "{trailing} samples");

@@ -2,8 +2,8 @@
 
 /// The items of two sequences in pairs, up to the end of the shorter one.
 ///
-/// [`Iterator::zip`] calls a function of the core library, which without link-time optimisation is not inlined: in loops of
-/// a few turns within every sample that takes longer than the turns.
+/// [`Iterator::zip`] calls a function of the core library, which is not inlined without link-time optimisation. In
+/// short loops within every sample that call costs more than the loops.
 #[inline(always)]
 pub fn pairs<A: IntoIterator, B: IntoIterator>(a: A, b: B) -> Pairs<A::IntoIter, B::IntoIter> {
     Pairs(a.into_iter(), b.into_iter())

@@ -5,9 +5,8 @@ use core::ops::{Add, Div, Mul, Neg, Sub};
 
 /// A real number the model can be run in.
 ///
-/// Elementary functions come from `libm` in every build (the exponential in `f32`
-/// from here), so that a host and a board compute the same bits. Products and
-/// sums are written out, never fused.
+/// Elementary functions come from `libm` in every build (the exponential in `f32` from this file), so host and
+/// board compute the same bits. Products and sums are separate operations, never fused.
 pub trait Real:
     nalgebra::Scalar
     + Copy
@@ -34,7 +33,7 @@ pub trait Real:
     fn sin(self) -> Self;
     /// Cosine, argument in rad.
     fn cos(self) -> Self;
-    /// Square root; 0 for a negative number, so that noise around zero is safe.
+    /// Square root; 0 for a negative number, so that noise around zero gives no NaN.
     fn sqrt(self) -> Self;
     /// Cube root.
     fn cbrt(self) -> Self;
@@ -56,12 +55,12 @@ pub trait Real:
     fn abs(self) -> Self {
         if self < Self::ZERO { -self } else { self }
     }
-    /// This number, or `low` where it is below. NaN is kept.
+    /// This number, or `low` if it is smaller. NaN stays NaN.
     #[inline(always)]
     fn at_least(self, low: Self) -> Self {
         if self < low { low } else { self }
     }
-    /// This number, or `high` where it is above. NaN is kept.
+    /// This number, or `high` if it is larger. NaN stays NaN.
     #[inline(always)]
     fn at_most(self, high: Self) -> Self {
         if self > high { high } else { self }
@@ -107,7 +106,7 @@ macro_rules! real {
             }
             #[inline]
             fn round(self) -> i32 {
-                // Truncation and the remainder are exact, which adding 0.5 is not.
+                // Truncation and the remainder are exact; adding 0.5 is not.
                 let whole = self as i32;
                 let rest = self - whole as $float;
                 whole.saturating_add((rest + rest) as i32)
@@ -128,8 +127,7 @@ macro_rules! real {
 /// e raised to `x` within 2 units in the last place; 0 where the result would be
 /// below the normal numbers. After S. Moshier's Cephes library.
 ///
-/// `libm::expf` takes twice the instructions, and a law that looks ahead calls it
-/// for every sample that it looks ahead.
+/// `libm::expf` needs twice the instructions, and a tracking law calls the exponential for every predicted sample.
 #[inline]
 fn single_exp(x: f32) -> f32 {
     const HIGHEST: f32 = 88.722_84;

@@ -30,7 +30,7 @@ impl LagConvention {
 /// For on/off jets all are equal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Grading {
-    /// Eq. (3) with j for u: drive and rate are both proportional to the jet.
+    /// Eq. (3) with j instead of u: drive and rate are both proportional to the jet.
     #[default]
     Proportional,
     /// The equilibrium is proportional to the jet; the rate is interpolated between the separated and the
@@ -52,7 +52,7 @@ impl Grading {
     /// Every response.
     pub const ALL: [Self; 3] = [Self::Proportional, Self::Interpolated, Self::Switched];
 
-    /// The share of the attached flow's rate, 0–1 for jets of 0–1.
+    /// The weight of the attached flow's rate, 0–1 for jets of 0–1.
     #[inline]
     fn share<T: Real>(self, jet: T) -> T {
         match self {
@@ -103,12 +103,12 @@ pub struct Pace<T> {
     pub order: usize,
     /// The separated flow's rate, per sample: 1 − Σ a_i of those lags.
     pub off: T,
-    /// The attached flow's under the first input's jet: that − Σ c_j1 of those lags.
+    /// The attached flow's rate under the first input's jet: the separated flow's minus Σ c_j1 of those lags.
     pub on: T,
 }
 
 impl<T: Real> Pace<T> {
-    /// The rate, per sample, under a jet that has this `share` of the attached flow's.
+    /// The rate, per sample, for this weight `share` of the attached flow's rate.
     #[inline(always)]
     fn at(&self, share: T) -> T {
         self.off + (self.on - self.off) * share
@@ -120,7 +120,7 @@ impl<T: Real> Pace<T> {
 pub struct Known<T> {
     /// Of the a_i y_{k−τ_i}.
     pub free: T,
-    /// Of the c_j1 y_{k−τ̄_j}, the first input's.
+    /// Sum of the terms c_j1 y_{k−τ̄_j} of the first input.
     pub gain: T,
 }
 
@@ -220,7 +220,8 @@ impl<T: Real> Bilinear<'_, T> {
         y: &impl Past<T>,
     ) -> T {
         let mut sum = start;
-        // Slices without their first items cost less than two iterators, whose ends are told apart at every turn.
+        // Slices without their first items cost less than two iterators, whose ends would be compared in every
+        // iteration.
         while let ([first, x_after @ ..], [lag, lags_after @ ..]) = (x, lags) {
             let lag = self.convention.behind_newest(*lag);
             if lag < horizon {
@@ -396,7 +397,7 @@ mod tests {
             let [motion, released] = self::motion(grading, 1.0);
             assert!((motion - 0.05 * (0.8 - 0.3)).abs() < 1e-12 && released == 0.0);
         }
-        // In parallel, each for its part of the jet.
+        // Two flows in parallel, each with its part of the jet.
         let [_, released] = self::motion(Grading::Proportional, 0.4);
         assert!((released + 0.6 * 0.02 * 0.3).abs() < 1e-12);
         // One flow with an intermediate rate: 0.6 of 0.02 plus 0.4 of 0.05.

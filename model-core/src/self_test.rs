@@ -1,5 +1,4 @@
-//! What a board checks before it trusts its constants: a checksum over them and
-//! a short golden run.
+//! The board's self-test of its constants: a checksum and a short reference run.
 
 use crate::history::Memory;
 use crate::model::{Input, Parts, StateOf, step};
@@ -48,8 +47,7 @@ impl Default for Crc32 {
     }
 }
 
-/// Checksum over a model's structure and coefficients, bit for bit. Delay law
-/// and effects are covered by the golden run.
+/// Checksum over a model's structure and coefficients, bit for bit. The reference run covers delay law and effects.
 #[must_use]
 pub fn checksum<M: Parts<f32>>(model: &M) -> u32 {
     let (recursion, averaging) = (model.recursion(), model.averaging());
@@ -68,7 +66,7 @@ pub fn checksum<M: Parts<f32>>(model: &M) -> u32 {
     crc.value()
 }
 
-/// A golden run: what a model must say, bit for bit, to the test's command.
+/// A reference run: the bit-exact outputs of a model for the test command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Golden<const N: usize> {
     /// Samples between two expected values, at least 1.
@@ -77,8 +75,8 @@ pub struct Golden<const N: usize> {
     pub expected: [u32; N],
 }
 
-/// Whether the command of the golden run is on at sample `k`: blocks of 64
-/// samples, half of them on, single ones and runs.
+/// Whether the command of the reference run is on at sample `k`: blocks of 64 samples, half of them on, with single
+/// samples and longer runs.
 #[inline]
 #[must_use]
 pub const fn command(k: u32) -> bool {
@@ -117,7 +115,7 @@ pub fn run<M, Y, J>(
 }
 
 impl<const N: usize> Golden<N> {
-    /// Whether `model` says what is expected, every bit of it.
+    /// Whether `model` gives the expected output, in every bit.
     #[must_use]
     pub fn holds<M, Y, J>(&self, model: &M, state: StateOf<f32, M, Y, J>, channels: &[f32]) -> bool
     where

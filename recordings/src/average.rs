@@ -1,14 +1,14 @@
 //! Phase averages of raw recordings of any length in constant memory.
 //!
-//! A recording in which one command sequence is repeated is read once, row by row. Each repeat is laid over the others,
-//! and per sample of the period the mean, the standard error of the mean and the envelope are kept (Welford's
-//! recursion, which does not lose digits over millions of repeats). Memory is a few periods of accumulators, whatever
-//! the length of the file.
+//! A recording in which one command sequence is repeated is read once, row by row. Repeats are superimposed; for
+//! each sample of the period the mean, the standard error of the mean and the envelope are computed (Welford's
+//! recursion, which loses no digits over millions of repeats). The memory is a few periods of accumulators,
+//! whatever the length of the file.
 //!
-//! Repeats are aligned on the command's own edges: the first rising edge after the start is the anchor, and in every
-//! later repeat the rising edge closest to where the period puts it. The generator of the command and the clock of the
-//! recording may therefore drift apart without smearing the average. A period with a missing or unreadable sample, with a
-//! time step off the grid, without its anchor, or with another command than most periods have is dropped and counted.
+//! Repeats are aligned on the command's own edges. The first rising edge after the start is the anchor; in every
+//! later repeat it is the rising edge closest to the expected time. The command generator and the clock of the
+//! recording may therefore drift apart without smearing the average. A period is dropped and counted if it has a
+//! missing or unreadable sample, a time step off the grid, no anchor, or another command than most periods.
 
 use std::path::Path;
 
@@ -27,8 +27,8 @@ const PROGRESS_BYTES: u64 = 1 << 22;
 
 /// Phase-averages several recordings into one data set: each file becomes one record named by its stem.
 ///
-/// Records named in `held_out` are for validation, the others for identification. `progress` is called now and then
-/// with the index of the file and the bytes of it read so far.
+/// Records named in `held_out` are for validation, the others for identification. `progress` is called from time to
+/// time with the index of the file and the bytes of it read so far.
 ///
 /// # Errors
 /// [`AverageError`] when a file cannot be read, holds no complete period, or the files do not fit together.

@@ -5,7 +5,7 @@ use crate::error::{DataError, FilePlace};
 /// Alignment of the repeats.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Align {
-    /// On the command's rising edges (falls back to [`Align::Grid`] where the command never rises).
+    /// On the command's rising edges ([`Align::Grid`] if the command never rises).
     #[default]
     Edges,
     /// On whole periods counted from the start, by the recording's own clock.
@@ -120,7 +120,8 @@ pub enum AverageError {
     Data(#[from] DataError),
     /// The period does not fit the sampling.
     #[error(
-        "the period of {period_s} s does not hold a usable number of samples at {sample_period_s} s each; give the length of one repeat of the command sequence in seconds"
+        "the period of {period_s} s does not contain a usable number of samples of {sample_period_s} s each; \
+             give the length of one repeat of the command sequence in seconds"
     )]
     Period {
         /// The stated period.

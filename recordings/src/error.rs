@@ -10,7 +10,7 @@ use crate::import::problem::ImportProblem;
 pub struct FilePlace {
     /// The file (or folder) as the caller named it.
     pub file: Option<PathBuf>,
-    /// The name of the record, where the data were not read from a file of their own.
+    /// The name of the record, if the data were not read from a separate file.
     pub record: Option<String>,
     /// Line in the file; the header is line 1.
     pub line: Option<u64>,
@@ -155,7 +155,8 @@ pub enum DataProblem {
     Unreadable(std::io::Error),
     /// A folder without `dataset.toml`.
     #[error(
-        "the folder holds no dataset.toml; make a data set of its files with `host-fit import {folder} -o DIR` and give the folder DIR here",
+        "the folder contains no dataset.toml; make a data set of its files with `host-fit import {folder} -o \
+             DIR` and give the folder DIR here",
         folder = .0
     )]
     NoManifest(String),
@@ -170,7 +171,7 @@ pub enum DataProblem {
     NotText,
     /// A line above the length limit.
     #[error(
-        "the line is longer than 1 MiB, which no row of measurements is; check that this is a CSV file"
+        "the line is longer than 1 MiB, too long for a row of measurements; check that this is a CSV file"
     )]
     LineTooLong,
     /// The header line cannot be split into names.
@@ -212,7 +213,8 @@ pub enum DataProblem {
     },
     /// An empty cell.
     #[error(
-        "the value is missing; fill it in, or split the record there (`host-fit import` holds a u that is written only when it changes)"
+        "the value is missing; fill it in, or split the record there (`host-fit import` repeats a u that is \
+             written only when it changes)"
     )]
     MissingValue,
     /// Text where a number belongs.
@@ -228,7 +230,8 @@ pub enum DataProblem {
     TooLarge(f64),
     /// Time does not increase.
     #[error(
-        "time does not increase: {time} s follows {before} s; sort the rows, remove doubled ones, and print t with enough digits"
+        "time does not increase: {time} s follows {before} s; sort the rows, remove repeated ones, and print t \
+             with enough digits"
     )]
     TimeBackward {
         /// The previous row's time.
@@ -238,7 +241,9 @@ pub enum DataProblem {
     },
     /// Samples are missing.
     #[error(
-        "time jumps by {step} s where the sampling period is {period} s: about {missing} sample(s) missing; split the record there or fill the gap (if only the times are at fault: `host-fit import` with --period SECONDS --ignore-time)"
+        "time jumps by {step} s where the sampling period is {period} s: about {missing} sample(s) missing; \
+             split the record there or fill the gap (if only the times are wrong: `host-fit import` with \
+             --period SECONDS --ignore-time)"
     )]
     TimeGap {
         /// The step found.
@@ -250,7 +255,9 @@ pub enum DataProblem {
     },
     /// Non-uniform time steps.
     #[error(
-        "the time step is {step} s where the sampling period is {period} s (10 % and the rounding of the printed times are allowed); resample the record to a uniform period, or, if only the times are at fault, `host-fit import` it with --period SECONDS --ignore-time"
+        "the time step is {step} s where the sampling period is {period} s (10 % and the rounding of the \
+             printed times are allowed); resample the record to a uniform period, or, if only the times are \
+             wrong, `host-fit import` it with --period SECONDS --ignore-time"
     )]
     TimeUneven {
         /// The step found.
@@ -267,12 +274,13 @@ pub enum DataProblem {
         found: f64,
         /// As stated.
         stated: f64,
-        /// Source of the statement: subject and verb of a sentence.
+        /// Source of the stated period: subject and verb of a sentence.
         by: &'static str,
     },
     /// Records of different sampling periods.
     #[error(
-        "the sampling period of this record is {found} s, that of record `{first}` is {other} s; a data set has one: import the records into a data set each, or resample one of them"
+        "the sampling period of this record is {found} s, that of record `{first}` is {other} s, but a data \
+             set has one period: import the records into separate data sets, or resample one of them"
     )]
     PeriodsDiffer {
         /// Of this record.
@@ -315,7 +323,8 @@ pub enum DataProblem {
     },
     /// More columns than a file of a data set can have.
     #[error(
-        "has {found} measured channels and {most} are the most; keep those that are needed (`host-fit import` with --channel NAME, or --no-channels)"
+        "has {found} measured channels, but at most {most} are allowed; keep those that are needed (`host-fit \
+             import` with --channel NAME, or --no-channels)"
     )]
     TooManyChannels {
         /// Number of channels.
@@ -331,7 +340,8 @@ pub enum DataProblem {
     BadCommandBefore(f64),
     /// A lead that leaves no scored sample.
     #[error(
-        "the first {lead} samples only lead up to what is judged, but the record has {samples}; lower lead_samples below that"
+        "lead_samples is {lead}, but the record has {samples} samples, so none would be scored; choose a \
+             smaller lead_samples"
     )]
     OnlyLead {
         /// Samples of the lead.
@@ -362,7 +372,7 @@ pub enum DataProblem {
         /// Length of this column.
         found: usize,
     },
-    /// The command is not on/off where it has to be.
+    /// The command is not on/off where it must be.
     #[error(
         "u = {0} is neither 0 nor 1, but an on/off command is needed here; scale the command so that off is 0 and on is 1"
     )]
@@ -376,7 +386,7 @@ pub enum DataProblem {
     #[error("this name is reserved (t, u, y, y_sd, y_min, y_max); rename the channel")]
     ReservedChannel,
     /// A name that cannot be printed or is empty.
-    #[error("a name must not be empty or hold control characters; rename it")]
+    #[error("a name must not be empty or contain control characters; rename it")]
     BadName,
     /// Two records with one name.
     #[error("the record name `{0}` is used twice; give every record its own name")]

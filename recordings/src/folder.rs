@@ -91,7 +91,7 @@ impl DataSet {
     /// Numbers are written in the shortest form that reads back to the same bits.
     ///
     /// # Errors
-    /// [`OutputError`] when the folder cannot be written; nothing is left behind then.
+    /// [`OutputError`] if the folder cannot be written; no partial output remains.
     pub fn save(&self, dir: &Path) -> Result<(), OutputError> {
         self.save_from(dir, &[])
     }
@@ -151,10 +151,10 @@ fn folder_of(manifest: &Path) -> &Path {
     }
 }
 
-/// The mapping that the records of an imported data set were made with; the first where they differ.
+/// The mapping with which the records of an imported data set were made; the first one if they differ.
 ///
 /// # Errors
-/// [`DataError`] when there is no readable `dataset.toml`, or it holds no mapping.
+/// [`DataError`] if there is no readable `dataset.toml`, or it contains no mapping.
 pub(crate) fn mapping_of(folder: &Path) -> Result<Mapping, DataError> {
     let folder = match folder.file_name().is_some_and(|n| n == MANIFEST) {
         true => folder_of(folder),
@@ -242,7 +242,7 @@ fn resolve(folder: &Path, file: &str, manifest: &FilePlace) -> Result<PathBuf, D
     Ok(path)
 }
 
-/// The TOML error in one paragraph, with the line and the key it is about.
+/// The TOML error in one paragraph, with its line and key.
 fn manifest_error(path: &Path, text: &str, error: &toml::de::Error) -> DataError {
     let mut place = FilePlace::file(path);
     if let Some(span) = error.span() {
@@ -263,7 +263,7 @@ fn manifest_error(path: &Path, text: &str, error: &toml::de::Error) -> DataError
     place.error(DataProblem::Manifest(message))
 }
 
-/// The record's name as a file name: letters, digits, `-`, `_` and `.` stay, the rest becomes `-`.
+/// The record's name as a file name: letters, digits, `-`, `_` and `.` stay, other characters become `-`.
 fn file_stem(name: &str) -> String {
     let stem: String = name
         .chars()
@@ -311,8 +311,8 @@ fn shortest(value: f64) -> String {
     }
 }
 
-/// Decimals with which the times are written: enough that the sampling period and t0 read back exactly where that is
-/// possible (0.001 → 3), at most 12.
+/// Number of decimals of the written times: enough that the sampling period and t0 read back exactly if possible
+/// (0.001 → 3), at most 12.
 fn time_decimals(record: &Record) -> usize {
     let exact = |decimals: usize| {
         let kept = |x: f64| format!("{x:.decimals$}").parse() == Ok(x);

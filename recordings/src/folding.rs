@@ -31,7 +31,7 @@ pub(super) struct Folding {
     anchor: Option<usize>,
     /// Command of the sample before the buffer.
     pub(super) before: Option<bool>,
-    /// Samples at the front of the buffer that belong to the period before, for an early anchor.
+    /// Samples at the front of the buffer that belong to the preceding period, for an early anchor.
     lead_in: usize,
     waiting: Vec<Waiting>,
     values: Vec<f64>,
@@ -143,7 +143,7 @@ impl Folding {
             on: self.last_on(),
             defect: Some(Defect::MissingSamples),
         };
-        // Whole periods inside a long gap are counted without walking through them.
+        // Whole periods inside a long gap are counted without iterating over them.
         let period = match self.align {
             Align::Edges => self.length as f64,
             Align::Grid => self.exact_length,
@@ -202,7 +202,7 @@ impl Folding {
         self.settle();
     }
 
-    /// Completes the running period once it, and the margin for a late anchor, is in the buffer.
+    /// Completes the current period when it, and the margin for a late anchor, is in the buffer.
     fn settle(&mut self) {
         let margin = match self.align {
             Align::Edges => self.slack,
@@ -237,7 +237,7 @@ impl Folding {
         self.values.drain(..keep_from * self.width);
     }
 
-    /// Delay of the running period's anchor against its expected time, samples; `None` if there is none.
+    /// Delay of the current period's anchor relative to its expected time, samples; `None` if there is no anchor.
     fn anchor_shift(&mut self) -> Option<isize> {
         let rises = |i: usize| -> bool {
             let now = self.waiting.get(i).is_some_and(|w| w.on);
@@ -276,8 +276,8 @@ impl Folding {
             self.drop_period(defect.unwrap_or(Defect::UnreadableValue), line, 1);
             return;
         }
-        // Edges within the jitter of the period's ends may belong to the neighbouring period: only edges
-        // between count, starting from the level at the start of the period.
+        // Edges within the jitter of the period's ends may belong to the neighbouring period. Only edges between
+        // them count, starting from the level at the start of the period.
         self.edges.clear();
         let inner = self.jitter..self.length.saturating_sub(self.jitter);
         let mut level = None;
@@ -334,7 +334,7 @@ impl Folding {
         role: Use,
         place: FilePlace,
     ) -> Result<(Record, AverageSummary), AverageError> {
-        // The last period may be complete and only wait for the margin of a late anchor.
+        // The last period may be complete and waiting only for the margin of a late anchor.
         let mut left_over = self.waiting.len().saturating_sub(self.lead_in);
         if self.align == Align::Edges && left_over >= self.length {
             let shift = self.anchor_shift();
@@ -354,7 +354,7 @@ impl Folding {
                 .map(|(d, (n, line))| format!("{n} dropped: {}, first at line {line}", d.words()))
                 .collect();
             found.push(format!(
-                "{left_over} samples left over of {} in a period",
+                "{left_over} samples left over; a period has {}",
                 self.length
             ));
             return Err(AverageError::NothingLeft {

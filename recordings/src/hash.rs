@@ -1,9 +1,9 @@
-//! The content hash of a data set: what a model file states as its provenance.
+//! The content hash of a data set, which a model file states as its provenance.
 //!
-//! FNV-1a, 64 bits, over the sampling period and, per record, its name, its use, t0, every column's name and values
-//! as IEEE 754 bits (little-endian), each string and column preceded by its length, and, where they are stated, the
-//! command before the record and its lead. It tells data sets apart; it is no
-//! protection against someone who wants two sets to collide. The title is not part of it.
+//! FNV-1a, 64 bits, over the sampling period and the records. Each record contributes its name, its use, t0, and
+//! every column's name and values as IEEE 754 bits (little-endian), each string and column preceded by its length.
+//! If stated, the command before the record and its lead contribute too. The title does not. The hash distinguishes
+//! data sets; it does not protect against deliberate collisions.
 
 use crate::record::{Record, Use};
 

@@ -1,9 +1,9 @@
 //! Recordings: records of command and response, read, checked and averaged.
 //!
-//! A data set is a folder with `dataset.toml` and CSV files, or one CSV file. Everything is checked when it is loaded
-//! ([`DataSet::load`]) or put together in memory ([`DataSet::from_records`]); every fault is one paragraph that names
-//! file, line and column, or the TOML key, and the remedy ([`DataError`]). Whatever is written appears whole or not at
-//! all ([`output`]). Other formats are made into data sets by [`mod@import`].
+//! A data set is a folder with `dataset.toml` and CSV files, or one CSV file. Everything is checked when it is
+//! loaded ([`DataSet::load`]) or assembled in memory ([`DataSet::from_records`]). Every error is one paragraph that
+//! names file, line and column, or the TOML key, and the remedy ([`DataError`]). Files are written completely or
+//! not at all ([`output`]). Other formats are converted to data sets by [`mod@import`].
 
 mod average;
 mod averaging;

@@ -12,7 +12,7 @@ static LIMIT: AtomicU64 = AtomicU64::new(USUAL);
 
 /// The memory limit would be exceeded.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{what} would take {} of memory and {} may be used; {remedy}, or allow more with --memory {}", gigabytes(*.needed), gigabytes(*.limit), needed.div_ceil(1_000_000_000))]
+#[error("{what} needs {} of memory, but {} are allowed; {remedy}, or allow more with --memory {}", gigabytes(*.needed), gigabytes(*.limit), needed.div_ceil(1_000_000_000))]
 pub struct TooMuch {
     /// The purpose.
     pub what: String,
@@ -39,7 +39,7 @@ pub fn limit() -> u64 {
     LIMIT.load(Ordering::Relaxed)
 }
 
-/// Checks that `what` may take so many bytes.
+/// Checks that `what` may use this many bytes.
 ///
 /// # Errors
 /// [`TooMuch`] with the need, the limit and the `remedy`.
@@ -66,7 +66,7 @@ mod tests {
         let error = allow(6_300_000_000, "--max-lag 12000", "lower it").unwrap_err();
         assert_eq!(
             error.to_string(),
-            "--max-lag 12000 would take 6.3 GB of memory and 2.0 GB may be used; lower it, or allow more with --memory 7"
+            "--max-lag 12000 needs 6.3 GB of memory, but 2.0 GB are allowed; lower it, or allow more with --memory 7"
         );
     }
 }

@@ -9,9 +9,10 @@ use std::path::{Component, Path, PathBuf};
 #[non_exhaustive]
 pub enum OutputError {
     /// The operating system refused (no such folder, no permission, disk full …).
-    #[error("{path} cannot be written ({cause}); nothing was left behind; check that its folder exists, may be written to and has space", path = .path.display())]
+    #[error("{path} cannot be written ({cause}); no partial file was left; check that its folder exists, is \
+         writable and has space", path = .path.display())]
     Io {
-        /// The file or folder that was asked for.
+        /// The requested file or folder.
         path: PathBuf,
         /// What the operating system said.
         cause: io::Error,
@@ -30,14 +31,14 @@ pub enum OutputError {
     },
 }
 
-/// Writes a file through `write`; the file appears under `path` only when everything went well.
+/// Writes a file through `write`; the file appears under `path` only if everything succeeded.
 ///
 /// An existing file is replaced (through a symbolic link, its target). A path that exists and is not a regular file
-/// (`/dev/stdout`, a pipe) is written to directly: there is nothing to rename.
+/// (`/dev/stdout`, a pipe) is written directly, because it cannot be renamed.
 ///
 /// # Errors
-/// [`OutputError`] when the temporary file cannot be made, `write` fails, or the rename is refused; the previous
-/// content of `path` is then untouched.
+/// [`OutputError`] if the temporary file cannot be made, `write` fails, or the rename is refused; the previous
+/// content of `path` then stays.
 pub fn write_atomic<F>(path: &Path, write: F) -> Result<(), OutputError>
 where
     F: FnOnce(&mut dyn Write) -> io::Result<()>,
@@ -73,8 +74,8 @@ fn write_once(
     Ok(())
 }
 
-/// Refuses an output that [`write_atomic`] could not write now; what is there stays as it is. For commands that work long
-/// before they write.
+/// Refuses an output that [`write_atomic`] could not write now; the existing file stays unchanged. For commands
+/// that take long before they write.
 ///
 /// # Errors
 /// [`OutputError`] as of [`write_atomic`].
@@ -94,7 +95,7 @@ fn failed(path: &Path) -> impl Fn(io::Error) -> OutputError + Copy {
     }
 }
 
-/// What is written where `path` is asked for.
+/// The file that is written for the requested `path`.
 fn target(path: &Path) -> Result<PathBuf, OutputError> {
     let target = match fs::canonicalize(path) {
         Ok(existing) => existing,
@@ -109,14 +110,15 @@ fn target(path: &Path) -> Result<PathBuf, OutputError> {
     Ok(target)
 }
 
-/// An empty file beside `target`, which goes with the value.
+/// An empty file next to `target`, which is removed with the value.
 fn temporary(target: &Path) -> io::Result<tempfile::NamedTempFile> {
     permitted(tempfile::Builder::new().prefix(".host-fit-"), 0o666)
         .tempfile_in(parent_of(target))
         .map_err(without_temporary_name)
 }
 
-/// Several output files that belong together: written into a temporary folder beside the target, moved in together.
+/// Several output files that belong together: they are written into a temporary folder next to the target and moved
+/// in together.
 ///
 /// Dropped without [`Staging::commit`], it removes everything it wrote.
 #[derive(Debug)]
@@ -130,7 +132,7 @@ impl Staging {
     /// Starts the files of the folder `target`, which need not exist yet (its parent must).
     ///
     /// # Errors
-    /// [`OutputError`] when `target` is a file, or no folder can be made beside it.
+    /// [`OutputError`] if `target` is a file, or no folder can be made next to it.
     pub fn new(target: &Path) -> Result<Self, OutputError> {
         let failed = failed(target);
         let real = match fs::canonicalize(target) {
@@ -149,10 +151,10 @@ impl Staging {
         })
     }
 
-    /// Writes one file, `name` relative to the target folder (sub-folders are made).
+    /// Writes one file, `name` relative to the target folder (sub-folders are created).
     ///
     /// # Errors
-    /// [`OutputError`] when the name leads out of the folder or the file cannot be written.
+    /// [`OutputError`] if the name leads out of the folder or the file cannot be written.
     pub fn write<F>(&mut self, name: &str, write: F) -> Result<(), OutputError>
     where
         F: FnOnce(&mut dyn Write) -> io::Result<()>,
@@ -189,10 +191,10 @@ impl Staging {
 
     /// Moves everything into the target folder; files of the same names are replaced, others stay.
     ///
-    /// A target that does not exist yet appears complete in one rename; one that does is exchanged in one rename, where
-    /// the system can do that and it holds files only. Elsewhere the file that was written last, which says what the
-    /// others are (`dataset.toml`), is taken away first and moved in last: at no time are old and new files mixed to
-    /// something that loads.
+    /// A new target appears complete in one rename. An existing target is exchanged in one rename, if the system
+    /// supports that and the target contains only files. Otherwise the file that was written last (`dataset.toml`,
+    /// which lists the others) is removed first and moved in last. Old and new files are thus never mixed in a
+    /// loadable set.
     ///
     /// # Errors
     /// [`OutputError`] when a rename is refused.
@@ -203,7 +205,7 @@ impl Staging {
         };
         if !self.target.exists() {
             fs::rename(self.folder.path(), &self.target).map_err(|e| failed(&self.target, e))?;
-            // The folder has its final name now: there is nothing left to remove.
+            // The folder has its final name now, so nothing remains to be removed.
             let _ = self.folder.keep();
             return Ok(());
         }
@@ -439,7 +441,7 @@ mod tests {
             let looks = scope.spawn(|| {
                 let (mut mixed, mut seen) = (0, 0);
                 while !done.load(Ordering::Relaxed) {
-                    // A folder that is open stays unchanged.
+                    // A folder that is in use stays unchanged.
                     let names = ["dataset.toml", "a.csv", "b.csv", "dataset.toml"];
                     let read = names.map(|n| fs::read(target.join(n)).unwrap_or_default());
                     // Only if nothing was exchanged while reading.
@@ -463,7 +465,7 @@ mod tests {
         );
         assert_eq!(fs::read(target.join("notes.txt")).unwrap(), b"mine");
         assert_eq!(entries(folder.path()), ["set"]);
-        // With a folder inside, files are moved one by one, the last one last.
+        // If it contains a folder, files are moved one by one, the last one last.
         fs::create_dir(target.join("more")).unwrap();
         write("end");
         assert_eq!(fs::read(target.join("a.csv")).unwrap(), b"end");

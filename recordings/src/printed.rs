@@ -1,8 +1,8 @@
-//! What a printed number may be wrong by.
+//! Rounding error of a printed number.
 
 /// The value of one unit in the last printed place: 0.001 for `1.250`, 1 for `7`, 1e-7 for `1.5e-6`.
 ///
-/// This is what a printed time may be wrong by at most through rounding (half of it, to be exact, at either end of a step).
+/// It bounds the rounding error of a printed time step (half of it at either end of the step).
 pub(crate) fn printed_unit(cell: &[u8]) -> f64 {
     let (mantissa, exponent) = match cell.iter().position(|b| matches!(b, b'e' | b'E')) {
         Some(at) => {

@@ -24,9 +24,9 @@ enum Slot {
 /// Position of a row relative to the previous one on the sampling grid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Step {
-    /// This many samples after the row before (1 = the next one; more = samples are missing between them).
+    /// This many samples after the preceding row (1 = the next sample; more = samples are missing in between).
     Forward(u64),
-    /// Time decreased or stood still: the recording was restarted.
+    /// Time decreased or did not change: the recording was restarted.
     Restart,
     /// Off the grid, or without a readable time: treated as the next sample, excluded from averaging.
     OffGrid,
@@ -114,7 +114,7 @@ impl<R: BufRead> RawReader<R> {
         self.rows.bytes()
     }
 
-    /// The next row; its values go to `values` (as long as [`Self::names`]).
+    /// The next row; its values are written to `values` (as long as [`Self::names`]).
     pub(crate) fn next_row(&mut self, values: &mut [f64]) -> Result<Option<RawRow>, DataError> {
         if !self.rows.advance()? {
             return Ok(None);

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use crate::error::{DataError, DataProblem, FilePlace};
 use crate::thresholds::RULES;
 
-/// Names of columns with a meaning of their own; every other column is a measured channel.
+/// Names of columns with a fixed meaning; every other column is a measured channel.
 pub(crate) const RESERVED: [&str; 6] = ["t", "u", "y", "y_sd", "y_min", "y_max"];
 
 /// Larger values are rejected: their squares would overflow.
@@ -39,16 +39,15 @@ pub struct Record {
     pub sample_period_s: f64,
     /// Time of sample 0 as written in the file, s.
     pub t0: f64,
-    /// Command before the first sample, in the unit of `u`, constant before it; none for the first value of
-    /// `u`.
+    /// Command before the first sample, in the unit of `u`, constant before it; `None` for the first value of `u`.
     pub u_before: Option<f64>,
     /// Number of unscored samples at the start (simulated as a lead); at least one sample follows. 0 for
     /// none.
     pub lead: usize,
     /// y before the first sample, if known; set by the preparation, not stored in files.
     pub y_before: Option<f64>,
-    /// y of the first samples, which a free run follows because the past that they depend on is not recorded;
-    /// empty for a record that starts at rest. Set by the preparation, not stored in files.
+    /// y of the first samples, which a free run follows because the past that they depend on was not recorded.
+    /// Empty for a record that starts at rest. Set by the preparation, not stored in files.
     pub followed: Vec<f64>,
     /// Command (or input) per sample; 0 and 1 for an on/off actuator, any finite value otherwise.
     pub u: Vec<f64>,
@@ -65,10 +64,10 @@ pub struct Record {
 }
 
 impl Record {
-    /// The samples `from..to` as a record of their own; what lies beyond the end is left out.
+    /// The samples `from..to` as a separate record; samples beyond the end are left out.
     ///
-    /// The command before a part is the sample before it. Samples of the lead stay lead: a part that lies inside the
-    /// lead is lead altogether.
+    /// The command before a part is that of the preceding sample. Samples of the lead stay lead; a part inside the
+    /// lead is entirely lead.
     #[must_use]
     pub fn part(&self, from: usize, to: usize) -> Self {
         let cut = |series: &Vec<f64>| -> Vec<f64> {
@@ -151,8 +150,7 @@ impl Record {
         self.u.iter().all(|&u| u == 0.0 || u == 1.0)
     }
 
-    /// The first sample of an otherwise on/off command that is neither 0 nor 1; none for a command with
-    /// levels.
+    /// The first sample of an otherwise on/off command that is neither 0 nor 1; `None` for a command with levels.
     pub(crate) fn stray(&self) -> Option<usize> {
         let takes = |level: f64| self.u.contains(&level);
         let odd = |u: &f64| *u != 0.0 && *u != 1.0;
@@ -182,7 +180,8 @@ impl Record {
             )
     }
 
-    /// Checks everything a [`DataSet`] promises about a record; `place` turns a sample into a place in a file.
+    /// Checks all properties of a record that a [`DataSet`] guarantees; `place` turns a sample into a place in a
+    /// file.
     pub(crate) fn check(
         &self,
         place: &dyn Fn(Option<usize>) -> FilePlace,
@@ -297,7 +296,7 @@ pub(crate) fn indexed(values: Option<&[f64]>) -> impl Iterator<Item = (usize, &f
     values.unwrap_or_default().iter().enumerate()
 }
 
-/// Checks that every value is finite and of a sensible size.
+/// Checks that every value is finite and not too large.
 pub(crate) fn check_values(
     column: &str,
     values: &[f64],

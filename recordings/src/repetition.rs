@@ -2,7 +2,7 @@
 
 use crate::thresholds::RULES;
 
-/// Largest number of edges kept; the rest of the recording is assumed to continue alike.
+/// Largest number of stored edges; the rest of the recording is assumed to continue in the same way.
 const MOST: usize = 8000;
 
 /// Edges of a command: the sample in which the new level begins, and whether it is on.
@@ -34,8 +34,8 @@ impl Edges {
         self.is_over = true;
     }
 
-    /// The shortest time, in samples, after which the command repeats at least twice in the recording; none
-    /// if it does not. Edges may differ by `jitter` samples.
+    /// The shortest time, in samples, after which the command repeats at least twice in the recording; `None` if it
+    /// does not. Edges may differ by `jitter` samples.
     pub(crate) fn repeat(&self, jitter: usize) -> Option<u64> {
         let last = self.edges.last()?.0;
         let rises = || self.edges.iter().filter(|e| e.1).map(|e| e.0);

@@ -1,8 +1,8 @@
 //! Rows of a CSV file, one line at a time, with exact line numbers.
 //!
-//! The header line goes through the `csv` crate (names may be quoted); the rows hold only numbers and are split
-//! here, because the line numbers of the `csv` crate are off after blank lines and with CRLF line ends, and because a
-//! raw recording of several GB is read through this same code.
+//! The header line goes through the `csv` crate, because names may be quoted. The rows contain only numbers and are
+//! split here, for two reasons: the line numbers of the `csv` crate are wrong after blank lines and with CRLF line
+//! ends, and raw recordings of several GB are read by the same code.
 
 use std::collections::HashSet;
 use std::fs::File;
@@ -39,7 +39,7 @@ pub(crate) fn open_text(path: &Path, buffer: usize) -> Result<BufReader<File>, D
     Err(FilePlace::file(path).error(DataProblem::ToImport { kind, name }))
 }
 
-/// Reads the rows of one CSV file in order; holds one line in memory.
+/// Reads the rows of one CSV file in order, with one line in memory.
 pub(crate) struct RowReader<R> {
     source: R,
     path: PathBuf,

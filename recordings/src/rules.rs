@@ -157,12 +157,12 @@ pub enum ChangeError {
     },
 }
 
-/// A value may be changed by up to this factor: beyond it a rule no longer does what it is for.
+/// A value may be changed by up to this factor, beyond which a rule would lose its purpose.
 const MOST_CHANGED: f64 = 100.0;
 
 impl Change {
-    /// The change that `NAME=VALUE` asks for; NAME is `group.rule`, or the rule alone where one group has it. `books` are
-    /// the built-in values.
+    /// The change that `NAME=VALUE` requests. NAME is `group.rule`, or the rule alone if only one group has it.
+    /// `books` are the built-in values.
     ///
     /// # Errors
     /// [`ChangeError`].
@@ -204,7 +204,7 @@ impl Change {
 }
 
 impl Value {
-    /// The value of the same kind that `text` gives, or what is needed.
+    /// The value of the same kind as `text`, or the required form.
     fn changed(&self, text: &str) -> Result<Self, String> {
         let within = |own: f64, new: f64| {
             let (least, most) = match own.abs() {
@@ -250,8 +250,8 @@ impl Value {
 /// The changes of this run.
 static CHANGES: OnceLock<Vec<Change>> = OnceLock::new();
 
-/// Changes rules for the rest of the program. Works once, before any rule was read; later calls and rules that were read
-/// before keep their values.
+/// Changes rules for the rest of the program. It works once, before any rule was read; later calls are ignored, and
+/// rules that were read before keep their values.
 pub fn change_for_this_run(changes: Vec<Change>) {
     let _ = CHANGES.set(changes);
 }
@@ -396,7 +396,7 @@ pub fn paragraph(lines: &[&str]) -> String {
 }
 
 #[cfg(test)]
-#[expect(unreachable_pub, reason = "what the macro writes is public")]
+#[expect(unreachable_pub, reason = "the items that the macro writes are public")]
 mod tests {
     use super::{Change, ChangeError, Value};
 

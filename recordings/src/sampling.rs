@@ -50,10 +50,10 @@ pub(crate) struct Rounded {
 }
 
 impl PrintedTimes {
-    /// The sampling period: `stated` after checking it against the rows, or taken from the rows.
+    /// The sampling period: `stated` after checking it against the rows, or estimated from the rows.
     ///
-    /// Needs at least two rows; all times finite. Steps that vary are allowed where the rounding of the printed times
-    /// explains all of them: then the period is the mean over the record.
+    /// Needs at least two rows; all times finite. Uneven steps are allowed if the rounding of the printed times
+    /// explains all of them; the period is then the mean over the record.
     pub(crate) fn clock(&self, stated: Option<Stated>) -> Result<Clock, TimeFault> {
         let fault = match self.period_of_steps(stated) {
             Ok(period_s) => {
@@ -73,8 +73,8 @@ impl PrintedTimes {
         })
     }
 
-    /// One unit in the last place of most times, s. A column of shortest decimals has `0` and `1` beside `0.25`, and the
-    /// rounding of binary numbers grows with them.
+    /// One unit in the last place of most times, s. A column of shortest decimals contains `0` and `1` as well as
+    /// `0.25`, and the rounding errors of binary numbers grow with them.
     fn resolution(&self) -> f64 {
         let mut units = self.unit.clone();
         let middle = units.len() / 2;
@@ -84,9 +84,9 @@ impl PrintedTimes {
         }
     }
 
-    /// Whether times k·period + offset, rounded as the printed ones are, give all of the printed times; each may be off
-    /// its place by the allowance for uneven steps beside. A few uncommon steps are no evidence of rounding unless the clock
-    /// counts whole seconds, and there a doubled time is none.
+    /// Whether times k·period + offset, rounded like the printed ones, reproduce all printed times. In addition
+    /// each time may deviate by the allowance for uneven steps. A few uncommon steps are not evidence of rounding
+    /// unless the clock counts whole seconds; with such a clock a repeated time is no evidence either.
     fn rounded(&self) -> Option<Rounded> {
         let last = self.time.len().checked_sub(1).filter(|&n| n >= 2)?;
         let unit = self.resolution();
@@ -136,8 +136,8 @@ impl PrintedTimes {
         })
     }
 
-    /// The time that the mean step is taken over, s, and its number of steps. Where times repeat it goes from one new time to
-    /// another: those are known to a step, not only to the unit in which the times are printed.
+    /// The time over which the mean step is computed, s, and its number of steps. If times repeat, it extends from
+    /// one new time to another, because those are known to a step, not only to the unit of the printed times.
     pub(crate) fn span(&self) -> (f64, usize) {
         let changes =
             || (1..self.time.len()).filter(|&row| self.time.get(row) > self.time.get(row - 1));
@@ -202,8 +202,8 @@ impl PrintedTimes {
         self.mean_period(stated)
     }
 
-    /// The mean step over the record in the fewest digits that its uncertainty permits, or the stated period,
-    /// with which the mean must agree.
+    /// The mean step over the record in the fewest digits that its uncertainty permits, or the stated period, with
+    /// which the mean must agree.
     fn mean_period(&self, stated: Option<Stated>) -> Result<f64, TimeFault> {
         let (span, steps) = self.span();
         if steps == 0 {
@@ -243,7 +243,8 @@ fn fault(row: usize, problem: DataProblem) -> TimeFault {
     TimeFault { row, problem }
 }
 
-/// The number with the fewest digits within a relative tolerance of `value`, as itself or as the reciprocal of a rate.
+/// The number with the fewest digits within a relative tolerance of `value`, or whose reciprocal (a rate) has the
+/// fewest digits.
 pub(crate) fn tidy(value: f64, tolerance: f64) -> f64 {
     if !(value.is_finite() && value > 0.0) {
         return value;
@@ -386,7 +387,7 @@ mod tests {
             let wrong = times.clock(stated(1.5 * period)).unwrap_err();
             assert!(matches!(wrong.problem, DataProblem::PeriodMismatch { .. }));
         }
-        // Two consecutive missing samples, or single ones at irregular positions, are no rounding.
+        // Two consecutive missing samples, or single ones at irregular positions, are not explained by rounding.
         for missing in [&[200, 201][..], &[100, 150, 170]] {
             let mut times = whole(600, 1.0, 1.0, 0.0);
             for &row in missing.iter().rev() {
@@ -400,7 +401,7 @@ mod tests {
         assert!((minutes.period_s - 10.0).abs() < 0.2);
     }
 
-    /// Clocks with milliseconds do not slip: a step of two periods is a missing sample.
+    /// A clock with milliseconds does not skip steps by rounding: a step of two periods is a missing sample.
     #[test]
     fn fine_clocks_are_rounded_only_where_many_steps_say_so() {
         let slow = whole(5000, 0.001_3, 0.001, 0.0).clock(None).unwrap();

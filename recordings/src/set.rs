@@ -6,14 +6,14 @@ use crate::record::{Origin, Record, Use, indexed};
 use crate::sampling::tidy;
 use crate::thresholds::RULES;
 
-/// The file that makes a folder a data set.
+/// The name of the file that makes a folder a data set.
 pub(crate) const MANIFEST: &str = "dataset.toml";
 
 /// Records of one rig and one sampling period.
 ///
-/// Made by [`DataSet::load`] or [`DataSet::from_records`], which check everything said at [`Record`]; code that takes
-/// a `DataSet` relies on it. Records that are to be changed go through [`DataSet::from_records`] again, which also
-/// renews the hash.
+/// Made by [`DataSet::load`] or [`DataSet::from_records`], which check every condition stated at [`Record`]; code
+/// that receives a `DataSet` relies on it. Changed records must pass through [`DataSet::from_records`] again, which
+/// also renews the hash.
 #[derive(Debug, Clone)]
 pub struct DataSet {
     /// Title for reports.
@@ -176,8 +176,8 @@ pub(crate) struct OnePeriod {
     pub(crate) mean: f64,
 }
 
-/// Gives records whose sampling periods differ by less than a sample over the longest of them one period, the mean over
-/// all steps. Nothing is done, and none returned, where they are equal or differ by more.
+/// Gives records one period, the mean over all steps, if their sampling periods differ by less than a sample over
+/// the longest record. If they are equal or differ by more, nothing is changed and `None` returned.
 pub(crate) fn unite_periods(records: &mut [Record]) -> Option<OnePeriod> {
     let mut found = OnePeriod {
         shortest: f64::INFINITY,
@@ -247,7 +247,7 @@ mod tests {
         assert!((found.mean - 0.990444).abs() < 2e-5, "{found:?}");
         assert!(records.iter().all(|r| r.sample_period_s == found.mean));
         assert_eq!(unite_periods(&mut records), None);
-        // 899 steps that are each 0.2 % longer are 1.8 samples more.
+        // 899 steps that are each 0.2 % longer are together 1.8 samples longer.
         let mut records = [of(0.990, 900), of(0.992, 900)];
         assert_eq!(unite_periods(&mut records), None);
         assert_eq!(records[1].sample_period_s, 0.992);

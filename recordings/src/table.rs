@@ -32,7 +32,7 @@ impl Table {
         Self::load_beside(path, stated, 0)
     }
 
-    /// The same with so many bytes of memory already in use.
+    /// The same with this many bytes of memory already in use.
     pub(crate) fn load_beside(
         path: &Path,
         stated: Option<Stated>,
@@ -171,7 +171,7 @@ pub struct InputFile {
 }
 
 impl InputFile {
-    /// Loads the file; its sampling period is `stated` when given, otherwise that of its column `t`.
+    /// Loads the file; its sampling period is `stated` if given, otherwise that of its column `t`.
     ///
     /// # Errors
     /// [`DataError`] naming file, line and column of the first fault.

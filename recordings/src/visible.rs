@@ -2,10 +2,10 @@
 
 use std::borrow::Cow;
 
-/// `text` with every character that acts on a terminal or a reader instead of being seen written as `\u{…}`:
-/// control characters other than line ends and tabs, and marks that change the direction of text.
+/// `text` with all characters escaped as `\u{…}` that control the display instead of being shown: control
+/// characters other than line ends and tabs, and marks that change the direction of text.
 ///
-/// In Rust the escape means the same character within a literal, and nothing within a comment.
+/// In Rust the escape has the same meaning within a literal, and none within a comment.
 ///
 /// ```
 /// use recordings::visible;
@@ -17,7 +17,8 @@ pub fn visible(text: &str) -> Cow<'_, str> {
     escaped(text, |c, out| out.extend(c.escape_unicode()))
 }
 
-/// A JSON document in which the same characters are escaped as JSON has it; they can stand within strings only.
+/// A JSON document in which the same characters are escaped in the notation of JSON; they can occur only within
+/// strings.
 ///
 /// ```
 /// assert_eq!(recordings::visible_json("[\"a\u{202e}b\"]"), "[\"a\\u202eb\"]");

@@ -1,4 +1,5 @@
-//! Files made by other programs (`import/make.py`) become the record that they hold, and damaged ones a paragraph.
+//! Files made by other programs (`import/make.py`) give the expected record; damaged files give an error of one
+//! paragraph.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -255,7 +256,7 @@ fn faults_name_the_variable_and_the_remedy() {
             assert!(text.contains(part), "{name}: no `{part}` in: {text}");
         }
     }
-    // A voltage is no on/off command, and is said to look like one.
+    // A voltage is not an on/off command; a remark says that it resembles one.
     let remarks = imported("v7.mat", &Mapping::default()).files[0]
         .remarks
         .join("\n");
@@ -283,7 +284,7 @@ fn files_of_other_kinds_are_told_apart() {
         (
             "run.mat",
             b"\0\0\0\0old",
-            ["version 5 or 7", "save('run.mat'"],
+            ["version 5 to 7", "save('run.mat'"],
         ),
         ("run.xlsx", &workbook, ["spreadsheet", "CSV"]),
         ("run.csv", b"\x00\x01\x02binary", ["UTF-8", "CSV"]),
@@ -313,7 +314,7 @@ fn replace(bytes: &[u8], from: &[u8], to: &[u8]) -> Vec<u8> {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 1500, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// Whatever is done to a file, its import ends in records that keep their promises or in a paragraph.
+    /// Whatever is done to a file, its import ends in valid records or in an error of one paragraph.
     #[test]
     fn damaged_files_never_panic(
         which in 0..FILES.len(),

@@ -1,5 +1,5 @@
-//! Files as loggers write them (`data/strangers`, generated) become the record that they hold; what they do not say, and
-//! what cannot be read, is named.
+//! Files written by loggers (`data/strangers`, generated) give the expected record. Missing information and
+//! unreadable cells are named in messages.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -95,7 +95,7 @@ fn what_was_understood_is_said() {
         ("truefalse.csv", &["True is 1, False is 0"]),
         (
             "uchange.csv",
-            &["keeps the value before it (396 of 400 cells)"],
+            &["repeats the previous value (396 of 400 cells)"],
         ),
     ] {
         let found = read(&[stranger("logs").join(file)], &Import::default());
@@ -139,7 +139,7 @@ fn serial_monitors_are_read() {
     assert_eq!(record.y[39], 39.5);
     let remarks = found.files[0].remarks.join("\n");
     assert!(
-        remarks.contains("line 42 is no row and is left out: `u:1 y`"),
+        remarks.contains("line 42 is not a row and is left out: `u:1 y`"),
         "{remarks}"
     );
 
@@ -208,7 +208,7 @@ fn rounded_stamps_miss_no_sample() {
     assert!((found.set.sample_period_s - 599.0 / 598.0).abs() < 1e-4);
     let remarks = found.files[0].remarks.join("\n");
     assert!(
-        remarks.contains("599 s / 598 = 1.0017 s, and no sample is missing"),
+        remarks.contains("599 s / 598 = 1.0017 s; no sample is missing"),
         "{remarks}"
     );
     for period in [1.0, 1.0017] {
@@ -226,7 +226,7 @@ fn rounded_stamps_miss_no_sample() {
         assert_eq!(found.set.sample_period_s, period);
         assert!(found.set.records[0].channels.is_empty());
     }
-    // As it is, every other command reads it too, and so the set that is made of it.
+    // Every other command reads the unchanged file too, and so the data set made of it.
     let alone = DataSet::load(&stranger("rounded-clock/log.csv")).unwrap();
     assert_eq!(alone.records[0].len(), 599);
     let folder = tempfile::tempdir().unwrap();
@@ -275,7 +275,7 @@ fn clocks_that_agree_within_a_sample_make_one_set() {
     );
     assert_eq!(stated.set.sample_period_s, 0.9904);
 
-    // A period that nobody stated is not called stated.
+    // A period that was estimated is not called stated.
     let folder = tempfile::tempdir().unwrap();
     let (slow, fast) = (
         folder.path().join("slow.csv"),

@@ -230,7 +230,7 @@ mod tests {
         }
     }
 
-    /// A test with `chance` of a false alarm in so many blocks of a second.
+    /// A test with the probability `chance` of a false alarm in this many blocks of a second.
     fn test_of(chance: f64, blocks: f64, learn: u32) -> Test {
         Test {
             block_s: 1.0,
@@ -244,7 +244,7 @@ mod tests {
         (0..runs).filter(|seed| stopped(*seed)).count()
     }
 
-    /// At 0.2 in 200 blocks; each run learns its own baseline. The bound N/c is not far from what happens.
+    /// At a probability of 0.2 in 200 blocks; each run learns its own baseline. The bound N/c is close to the count.
     #[test]
     fn false_alarms_are_as_rare_as_stated() {
         let test = test_of(0.2, 200.0, 60);

@@ -1,9 +1,8 @@
-//! What a rig is: played and measured.
+//! Measurement of a rig's properties.
 //!
-//! In this order: the valve shut, then open, each until the flow is steady; then
-//! pulses, and gaps in steady blowing, of several lengths until the shortest that the
-//! flow answers is known. What a healthy sensor does (noise, equal readings in a row,
-//! distance from the rails) is seen on the way.
+//! In this order: the valve closed, then open, each until the flow is steady; then pulses, and gaps in steady
+//! blowing, of several lengths, until the shortest one with a response is known. The behaviour of a healthy sensor
+//! (noise, equal readings in a row, distance from the rails) is measured at the same time.
 
 use wire::reply::Phase;
 
@@ -16,9 +15,9 @@ use crate::rig_file::{ChannelEntry, FULL_SCALE, RigFile, SensorEntry, VERSION, V
 /// Parameters of a calibration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plan {
-    /// How long the valve stays open, and shut, for the flow to become steady, s; the second half of it is measured.
-    /// `None`: 4 s, or 1000 samples where that is longer. Flows that take longer than 4 s are given longer rests and
-    /// longer pulses in proportion.
+    /// Time with the valve open, and closed, for the flow to become steady, s; the second half of it is measured.
+    /// `None`: 4 s, or 1000 samples if that is longer. Flows that need longer than 4 s get longer rests and longer
+    /// pulses in proportion.
     pub steady_s: Option<f64>,
     /// Pulses of each length.
     pub pulses: u32,
@@ -50,7 +49,7 @@ const STEADY: (f64, f64) = (4.0, 1000.0);
 struct Times {
     /// For a steady flow.
     steady: f64,
-    /// Between two pulses, until the flow has settled.
+    /// Time between two pulses for the flow to settle.
     rest: f64,
     /// Longest pulse that is tried.
     longest_pulse: f64,
@@ -68,8 +67,8 @@ impl Times {
     }
 }
 
-/// A run of equal readings counts as a stuck sensor if it is this factor longer than the longest seen, and at
-/// least this long.
+/// A run of equal readings counts as a stuck sensor if it is longer than the longest observed run by this factor,
+/// and at least this long.
 const STUCK: (u32, u32) = (20, 200);
 /// Readings this close to the ends of the converter's range count as saturated.
 const RAIL: f64 = 8.0;
@@ -90,8 +89,8 @@ pub struct ChannelSaid {
 /// Calibrates the rig behind `host`.
 ///
 /// # Errors
-/// [`LineError`] when the board cannot, or the rig is not as it needs to be: the
-/// flow does not answer, readings at a rail.
+/// [`LineError`] if the board cannot do it, or if the rig does not permit it: the flow does not respond, or
+/// readings are at a rail.
 pub fn calibrate(
     host: &mut Host,
     plan: &Plan,
@@ -101,7 +100,7 @@ pub fn calibrate(
     let board = host.hello()?;
     if let Phase::Faulted(_) | Phase::Armed | Phase::Playing = board.phase {
         return Err(LineError::Calibration(format!(
-            "the board is {}; see why, and disarm it",
+            "the board is {}; find the cause, and disarm it",
             word(board.phase)
         )));
     }
@@ -111,7 +110,8 @@ pub fn calibrate(
     let longest = 2.0 * times.steady + f64::from(plan.pulses) * (times.rest + times.longest_pulse);
     if longest / period > MOST_SAMPLES as f64 {
         return Err(LineError::Calibration(format!(
-            "{} pulses and {} s of steady flow take {:.0} samples at once, and {MOST_SAMPLES} are the most; wait for less (--steady, --pulses)",
+            "{} pulses and {} s of steady flow need {:.0} samples at once, but at most {MOST_SAMPLES} are \
+                 possible; reduce them (--steady, --pulses)",
             plan.pulses,
             times.steady,
             longest / period
@@ -122,7 +122,7 @@ pub fn calibrate(
         played(host, &command, &mut |progress| watch(what, progress))
     };
     let shut = play("valve shut", vec![false; steady])?;
-    // Open, then closed for as long: the next test starts at rest.
+    // Open, then closed for the same time, so that the next test starts at rest.
     let blown = play(
         "valve open",
         [vec![true; steady], vec![false; steady]].concat(),
@@ -135,14 +135,14 @@ pub fn calibrate(
     let swing = one - zero;
     if noise == 0.0 {
         return Err(LineError::Calibration(
-            "the reading does not move at all; is the sensor connected?".into(),
+            "the reading does not change at all; check the sensor's connection".into(),
         ));
     }
     // Noise is coloured: the scatter of segment means gives the standard error.
     let sure = stretches(&off).max(stretches(&on));
     if swing.abs() < plan.sigmas * sure || swing.abs() < 20.0 {
         return Err(LineError::Calibration(format!(
-            "steady blowing moves the reading by {swing:.1} counts only; is the air on, and the valve on its pin?"
+            "steady blowing changes the reading by only {swing:.1} counts; check the air supply and the valve's pin"
         )));
     }
     let seen = |counts: &[f64]| {
@@ -243,7 +243,7 @@ fn shortest(
     match first_that(&lengths(longest), &mut answers)? {
         Some(length) => Ok(length as f64 * period),
         None => Err(LineError::Calibration(format!(
-            "the flow answers no {what} up to {} s; allow longer ones, or more of them",
+            "the flow does not respond to any {what} up to {} s; allow longer ones, or more of them",
             times.longest_pulse
         ))),
     }
@@ -375,7 +375,7 @@ mod tests {
         };
         assert_eq!(of(None, 2e-4), usual);
         assert_eq!(of(None, 1e-3), usual);
-        // A shorter time is at the user's risk; pulses are not shortened.
+        // A shorter time is the user's responsibility; pulses are not shortened.
         let hasty = Times {
             steady: 1.5,
             ..usual

@@ -1,9 +1,8 @@
-//! A board under QEMU with a rig behind it, so that everyone can try the circle.
+//! A board under QEMU with a simulated rig, so that the whole workflow runs without hardware.
 //!
-//! QEMU's first serial line is the host's; its second carries readings and valve
-//! (`qemu-rig` of the firmware). The rig is the sample clock: it samples as fast as
-//! board and host can, but no further ahead of the host than a real board would
-//! be, unless the host has died.
+//! QEMU's first serial line is the host's; its second carries readings and valve (`qemu-rig` of the firmware). The
+//! rig is the sample clock. It samples as fast as board and host permit, but no further ahead of the host than a
+//! real board would be, unless the host has stopped.
 
 use std::io::{Read, Write};
 use std::net::TcpListener;
@@ -24,8 +23,7 @@ fn ahead(period_us: u32) -> u64 {
 
 /// A simulated rig: sensor and valve.
 pub trait Rig: Send {
-    /// Holds the valve for a sample period, then gives the counts of sensor and
-    /// channel, 12 bits each.
+    /// Holds the valve for a sample period, then returns the counts of sensor and channel, 12 bits each.
     fn sample(&mut self, open: bool) -> [u16; 2];
 }
 
@@ -115,8 +113,8 @@ impl Emulator {
         };
         if !elf.is_file() {
             return Err(failed(std::io::Error::other(
-                "there is no such program; `cargo xtask firmware --board qemu-rig` builds it, `cargo xtask setup` gets \
-                 what that needs",
+                "there is no such program; `cargo xtask firmware --board qemu-rig` builds it, `cargo xtask \
+                 setup` installs the requirements",
             )));
         }
         let listener = TcpListener::bind("127.0.0.1:0").map_err(failed)?;
@@ -136,7 +134,7 @@ impl Emulator {
             .map_err(failed)?;
         let ends = process.stdin.take().zip(process.stdout.take());
         let Some((to, from)) = ends else {
-            return Err(failed(std::io::Error::other("it has no serial line")));
+            return Err(failed(std::io::Error::other("QEMU has no serial line")));
         };
         let (pace, reset) = (Pace::default(), Arc::<AtomicBool>::default());
         let (samples, open) = (Arc::<AtomicU64>::default(), Arc::<AtomicBool>::default());
@@ -149,7 +147,7 @@ impl Emulator {
         std::thread::spawn(move || {
             if let Ok((line, _)) = listener.accept() {
                 let _ = line.set_nodelay(true);
-                // QEMU ends when the serial line does.
+                // QEMU ends when the serial line closes.
                 let _ = behind.run(&line, &mut *rig);
             }
         });

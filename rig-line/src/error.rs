@@ -11,7 +11,8 @@ use recordings::output::OutputError;
 pub enum LineError {
     /// The device cannot be opened.
     #[error(
-        "{port} cannot be opened ({cause}); is the board plugged in, and may you use the port?"
+        "{port} cannot be opened ({cause}); check that the board is connected and that you have permission to \
+             use the port"
     )]
     Open {
         /// The device, or the program behind it.
@@ -20,20 +21,18 @@ pub enum LineError {
         cause: std::io::Error,
     },
     /// Another program has the device.
-    #[error("{0} is in use by another program; a board listens to one host at a time")]
+    #[error("{0} is in use by another program; a board accepts one host at a time")]
     InUse(String),
     /// The connection is lost.
     #[error("the connection to the board is lost ({0})")]
     Gone(String),
     /// The board does not answer.
-    #[error(
-        "the board does not answer `{0}`; is the right firmware on it? (`cargo xtask firmware`)"
-    )]
+    #[error("the board does not answer `{0}`; check its firmware (`cargo xtask firmware`)")]
     Silent(&'static str),
     /// Host and board use different protocol versions.
     #[error(
-        "the board speaks version {board} of the protocol and this program version {host}; build the firmware anew with \
-         `cargo xtask firmware`"
+        "the board uses version {board} of the protocol and this program version {host}; rebuild the firmware \
+         with `cargo xtask firmware`"
     )]
     Version {
         /// Version of the board.
@@ -43,7 +42,7 @@ pub enum LineError {
     },
     /// The board reports invalid constants.
     #[error(
-        "the board reports {0}, which is impossible; build the firmware anew with `cargo xtask firmware`"
+        "the board reports {0}, which is impossible; rebuild the firmware with `cargo xtask firmware`"
     )]
     Constants(String),
     /// After a broken link a different board answers.
@@ -56,7 +55,7 @@ pub enum LineError {
     #[error("nothing was recorded: {0}")]
     Nothing(String),
     /// The recording cannot be stored.
-    #[error("the recording cannot be written ({0}); has the disk space?")]
+    #[error("the recording cannot be written ({0}); check the space on the disk")]
     Keep(std::io::Error),
     /// The board refuses a request.
     #[error("the board refuses to {asked}: {reason}")]
@@ -75,7 +74,7 @@ pub enum LineError {
         reason: String,
     },
     /// A time that exceeds the memory limit.
-    #[error("the longest {what} at this board's period is {longest_s:.0} s; ask for less")]
+    #[error("the longest {what} at this board's period is {longest_s:.0} s; choose a shorter one")]
     TooLong {
         /// The quantity that is too long.
         what: &'static str,

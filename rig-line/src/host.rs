@@ -490,28 +490,32 @@ fn check(info: &Info) -> Result<(), LineError> {
 /// Why the board refuses, with the remedy.
 fn reason(status: Status, detail: u32) -> String {
     match status {
-        Status::Busy => "another host has it; end that one first".into(),
-        Status::TooLong => format!("it keeps {detail} runs; play the command in shorter pieces"),
-        Status::Missing => format!("it has only the first {detail} runs; start again"),
+        Status::Busy => "another host uses it; end that one first".into(),
+        Status::TooLong => {
+            format!("it stores at most {detail} runs; play the command in shorter pieces")
+        }
+        Status::Missing => format!("it received only the first {detail} runs; start again"),
         Status::TooShort => format!(
-            "run {detail} (counted from 0, the first one shut) is shorter than the valve's hold time in the board's rig \
-             constants; lengthen it"
+            "run {detail} (counted from 0, the first one closed) is shorter than the valve's hold time in the \
+             board's rig constants; lengthen it"
         ),
         Status::OtherCommand => {
             "the command on the board differs from the one to play; start again".into()
         }
-        Status::Nothing => "there is nothing to play, or more samples than 32 bits count".into(),
+        Status::Nothing => {
+            "there is nothing to play, or the number of samples exceeds 32 bits".into()
+        }
         Status::Outside => {
-            "the value is outside its bounds; the board shut the valve and latched `setting`".into()
+            "the value is outside its bounds; the board closed the valve and latched `setting`".into()
         }
         Status::Pending => {
-            "the change before it is not complete (a ramp, or the valve's shortest time shut); wait and repeat".into()
+            "the preceding change is not complete (a ramp, or the valve's shortest closed time); wait and repeat".into()
         }
         Status::NoSetting => "its law has no such setting".into(),
         Status::NotRunning => "no law is running; arm it first (`--arm`)".into(),
         Status::NotDisarmed => match Phase::from_byte(detail as u8) {
             Some(Phase::Faulted(number)) => format!(
-                "it has latched `{}`; see to its cause, then disarm (`--disarm`)",
+                "it has latched `{}`; remove the cause, then disarm (`--disarm`)",
                 word(Phase::Faulted(number))
             ),
             Some(phase) => format!("it is {}; disarm it first (`--disarm`)", word(phase)),

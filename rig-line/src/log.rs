@@ -35,7 +35,7 @@ pub struct Written {
     pub damaged_frames: u64,
     /// Number of attempts: more than 1 if the link broke or samples were lost.
     pub parts: usize,
-    /// Why there are fewer repeats than requested, if so.
+    /// The reason for fewer repeats than requested, if there are fewer.
     pub cut_short: Option<String>,
 }
 
@@ -101,7 +101,7 @@ pub fn to_files(
         let mut keep = |repeat, samples: &[Sample]| rows.repeat(out, repeat, samples);
         outcome = record(host, connect, command, repeats, &mut keep, watch);
         match &outcome {
-            // Without a complete repeat there is no file.
+            // Without a complete repeat no file is written.
             Ok(recording) if recording.whole > 0 => Ok(()),
             Ok(recording) => Err(io::Error::other(
                 recording.cut_short.clone().unwrap_or_default(),
@@ -248,8 +248,8 @@ impl<'a> Header<'a> {
     fn text(&self) -> String {
         let body = toml::to_string(self).unwrap_or_default();
         format!(
-            "# A recording by the board. Repeats follow one another on one clock; every one came whole and from rest.\n\
-             # `average` reads the file of the same name: --period {}\n{body}",
+            "# A recording by the board. Repeats follow one another on one clock; each is complete and starts \
+             from rest.\n# `average` reads the file of the same name: --period {}\n{body}",
             self.samples_per_repeat as f64 * self.sample_period_s
         )
     }

@@ -51,7 +51,7 @@ impl Port {
     /// A device at 115 200 baud, 8N1, as the boards set their UART up.
     ///
     /// # Errors
-    /// [`LineError`] when it cannot be opened or another host has it.
+    /// [`LineError`] if it cannot be opened or another host uses it.
     pub fn serial(device: &Path) -> Result<Self, LineError> {
         let failed = |cause| LineError::Open {
             port: device.display().to_string(),
@@ -120,7 +120,7 @@ impl Port {
         }
     }
 
-    /// Whether this end reads; without reading the line fills up, to test the board.
+    /// Whether this end reads. Without reading the line fills up, which tests the board.
     pub fn reads(&self, reads: bool) {
         self.reads.store(reads, Ordering::Relaxed);
     }

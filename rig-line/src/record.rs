@@ -74,11 +74,11 @@ pub struct Recording {
     pub parts: Vec<Part>,
     /// Lost samples.
     pub gaps: Vec<Gap>,
-    /// Samples that came, also of repeats that were not kept.
+    /// Received samples, including those of incomplete repeats.
     pub samples: u64,
     /// Frames that came damaged.
     pub damaged_frames: u64,
-    /// Why it ended before all repeats were whole.
+    /// The reason for the end before all repeats were complete.
     pub cut_short: Option<String>,
 }
 
@@ -100,18 +100,18 @@ enum End {
     Broken(String),
 }
 
-/// Opens the line again after it broke.
+/// Reopens the line after it broke.
 pub type Connect<'a> = dyn FnMut() -> Result<Host, LineError> + 'a;
-/// Takes a whole repeat: its number and samples.
+/// Receives a complete repeat: its number and samples.
 pub type Keep<'a> = dyn FnMut(u32, &[Sample]) -> std::io::Result<()> + 'a;
 
-/// Has `host` play `command` until `repeats` of it came whole and hands each to `keep`.
+/// Plays `command` on `host` until `repeats` complete repeats were received, and passes each to `keep`.
 ///
-/// A fault, a board that is somebody else, a line on which nothing comes whole:
-/// then the recording is cut short and says why, and what was whole is kept.
+/// The recording ends early, with the reason, after a fault, with another board, or on a line without complete
+/// repeats. Complete repeats are kept.
 ///
 /// # Errors
-/// [`LineError`] when nothing can be played at all.
+/// [`LineError`] if nothing can be played at all.
 pub fn record(
     host: &mut Host,
     connect: &mut Connect<'_>,
@@ -142,7 +142,7 @@ pub fn record(
         let before = session.recording.whole;
         let end = match session.turn(host) {
             Ok(end) => end,
-            // What can be played later can be played now.
+            // Playing may become possible later, so the attempt is repeated.
             Err(LineError::Gone(why)) => End::Broken(why),
             Err(LineError::Silent(_)) => End::Broken("the board fell silent".into()),
             Err(other @ LineError::Keep(_)) => return Err(other),
@@ -169,9 +169,9 @@ pub fn record(
         }
         let cut = match end {
             End::Shut(phase @ Phase::Faulted(_)) => {
-                Some(format!("the board shut the valve: {}", word(phase)))
+                Some(format!("the board closed the valve: {}", word(phase)))
             }
-            End::Shut(_) => Some("the valve was shut by hand or by another host".to_owned()),
+            End::Shut(_) => Some("the valve was closed by hand or by another host".to_owned()),
             End::Broken(_) => session.again(connect, host).err(),
             End::Played => None,
         };
@@ -184,7 +184,7 @@ pub fn record(
             session.recording.cut_short = cut;
         }
     }
-    // Nothing is left open; a board that does not hear it shuts by itself.
+    // The valve does not stay open: a board that does not receive this closes it by itself.
     let _ = host.disarm();
     Ok(session.recording)
 }
@@ -198,24 +198,25 @@ fn fits(command: &Command, board: &Info) -> Result<(), LineError> {
     let period = f64::from(board.period_us) * 1e-6;
     if (command.sample_period_s / period - 1.0).abs() > 1e-6 {
         return Err(refused(format!(
-            "it has a row every {} s and the board samples every {period} s; write it for the board's period",
+            "it has a row every {} s, but the board samples every {period} s; write it for the board's period",
             command.sample_period_s
         )));
     }
     if board.period_us < 400 {
         return Err(refused(format!(
-            "the board samples every {period} s, and the line transmits every sample only from 0.0004 s on"
+            "the board samples every {period} s, but the line can transmit every sample only at periods of at \
+                 least 0.0004 s"
         )));
     }
     if command.samples() > MOST_SAMPLES {
         return Err(refused(format!(
-            "with its rest it has {} samples and {MOST_SAMPLES} are the most; play it in shorter pieces",
+            "with its rest it has {} samples, but at most {MOST_SAMPLES} are possible; play it in shorter pieces",
             command.samples()
         )));
     }
     if command.runs.len() > usize::from(board.most_runs) {
         return Err(refused(format!(
-            "it has {} runs and the board keeps {}; play it in shorter pieces",
+            "it has {} runs, but the board stores {}; play it in shorter pieces",
             command.runs.len(),
             board.most_runs
         )));
@@ -232,7 +233,7 @@ struct Session<'a, 'b> {
 }
 
 impl Session<'_, '_> {
-    /// Plays what is left in one go.
+    /// Plays the remaining repeats without interruption.
     fn turn(&mut self, host: &mut Host) -> Result<End, LineError> {
         let period = self.command.samples();
         // Samples of a stream are numbered with 32 bits.
@@ -240,7 +241,7 @@ impl Session<'_, '_> {
         let left = self.repeats - self.recording.whole;
         let repeats = u32::try_from(most).map_or(left, |most| left.min(most));
         let total = period * u64::from(repeats);
-        // Told of a link that broke, the board waits for that to be noted.
+        // After a broken link the board waits for an acknowledgement.
         if matches!(host.hello()?.phase, Phase::Faulted(n) if word(Phase::Faulted(n)) == "link") {
             host.disarm()?;
         }
@@ -272,7 +273,7 @@ impl Session<'_, '_> {
                     }
                     if u64::from(taken.next) > total {
                         return Ok(End::Broken(
-                            "the board plays on after the command's end".into(),
+                            "the board continues to play after the end of the command".into(),
                         ));
                     }
                     if streamed.phase != Phase::Playing
@@ -298,7 +299,7 @@ impl Session<'_, '_> {
                     match info.phase {
                         Phase::Playing if unanswered < 3 => unanswered += 1,
                         Phase::Playing => {
-                            return Ok(End::Broken("nothing of the stream comes".into()));
+                            return Ok(End::Broken("no samples arrive".into()));
                         }
                         // The last frames were lost.
                         Phase::Disarmed if info.samples - start >= total => {
@@ -306,7 +307,9 @@ impl Session<'_, '_> {
                             return Ok(End::Played);
                         }
                         phase if word(phase) == "link" => {
-                            return Ok(End::Broken("the board did not hear its host".into()));
+                            return Ok(End::Broken(
+                                "the board received no messages from its host".into(),
+                            ));
                         }
                         phase => return Ok(End::Shut(phase)),
                     }
@@ -327,7 +330,7 @@ impl Session<'_, '_> {
             if at == 0 {
                 taken.repeat.clear();
             }
-            // Only one that has come from its beginning grows.
+            // Only a repeat that was received from its first sample is extended.
             if taken.repeat.len() == at {
                 taken.repeat.push(*sample);
             }
@@ -351,7 +354,7 @@ impl Session<'_, '_> {
         Ok(())
     }
 
-    /// Notes what is missing before sample `first`.
+    /// Records the samples missing before sample `first`.
     fn gap(&mut self, taken: &mut Taken, first: u32, left_out: Option<u32>) {
         if first > taken.next {
             let samples = first - taken.next;
@@ -363,13 +366,13 @@ impl Session<'_, '_> {
                 left_out: left_out.min(samples),
             });
             taken.next = first;
-            // What is broken is not continued, whatever comes at the same place of another.
+            // An incomplete repeat is not continued with samples of another.
             taken.repeat.clear();
         }
         taken.left_out = left_out.unwrap_or(taken.left_out);
     }
 
-    /// Finds the board again after the link broke; why not.
+    /// Reconnects to the board after the link broke, or returns the reason for the failure.
     fn again(&self, connect: &mut Connect<'_>, host: &mut Host) -> Result<(), String> {
         let until = Instant::now() + GONE;
         loop {
@@ -381,7 +384,7 @@ impl Session<'_, '_> {
                     }
                     return match info.phase {
                         Phase::Faulted(_) if word(info.phase) != "link" => {
-                            Err(format!("the board shut the valve: {}", word(info.phase)))
+                            Err(format!("the board closed the valve: {}", word(info.phase)))
                         }
                         _ => Ok(()),
                     };
@@ -392,7 +395,7 @@ impl Session<'_, '_> {
             };
             if Instant::now() > until {
                 return Err(format!(
-                    "the board did not come back within {} s",
+                    "the board did not reconnect within {} s",
                     GONE.as_secs()
                 ));
             }
@@ -412,8 +415,8 @@ struct Taken {
     period: usize,
     /// Number of the next sample.
     next: u32,
-    /// Left out by the board so far.
+    /// Samples left out by the board so far.
     left_out: u32,
-    /// The present repeat, as far as it came whole.
+    /// The present repeat, as far as it was received completely.
     repeat: Vec<Sample>,
 }

@@ -1,5 +1,4 @@
-//! `rig.toml`: what a rig is, measured once and read by every build of its
-//! firmware.
+//! `rig.toml`: the properties of a rig, measured once and used by every build of its firmware.
 
 use std::path::Path;
 
@@ -9,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::LineError;
 
-/// The version of the file that this program writes and reads.
+/// The version of the file format.
 pub(crate) const VERSION: u32 = 1;
 
 /// A rig.
@@ -20,14 +19,13 @@ pub struct RigFile {
     pub format_version: u32,
     /// Sampling period, s.
     pub sample_period_s: f64,
-    /// Largest residual, averaged over about 64 samples, that the model may have
-    /// before the loop is shut, y.
+    /// Largest residual, averaged over about 64 samples, beyond which the board closes the valve, y.
     pub residual_envelope: f64,
     /// The hot film.
     pub sensor: SensorEntry,
     /// The valve.
     pub valve: ValveEntry,
-    /// The measured channel, where there is one.
+    /// The measured channel, if there is one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub channel: Option<ChannelEntry>,
 }
@@ -40,16 +38,16 @@ pub struct SensorEntry {
     pub zero_counts: f64,
     /// y per count: steady blowing is y = 1.
     pub per_count: f64,
-    /// Readings at or below it are at the lower rail, counts.
+    /// Readings at or below this are at the lower rail, counts.
     pub lower_rail_counts: f64,
-    /// Readings at or above it are at the upper rail, counts.
+    /// Readings at or above this are at the upper rail, counts.
     pub upper_rail_counts: f64,
     /// Equal readings in a row that mean a stuck sensor.
     pub stuck_after_samples: u32,
     /// Standard deviation of the noise, counts: off, and under steady blowing.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub noise_counts: Option<[f64; 2]>,
-    /// What is left of it in averages over 64 samples, counts, the larger of both: `design --rig` weighs it.
+    /// Remaining noise in averages over 64 samples, counts, the larger of both; used by `design --rig`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub slow_noise_counts: Option<f64>,
 }
@@ -58,9 +56,9 @@ pub struct SensorEntry {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ValveEntry {
-    /// Shortest time open that the flow answers, s.
+    /// Shortest time open with a response of the flow, s.
     pub shortest_on_s: f64,
-    /// Shortest time shut that the flow answers, s.
+    /// Shortest time closed with a response of the flow, s.
     pub shortest_off_s: f64,
 }
 
@@ -76,9 +74,9 @@ pub struct ChannelEntry {
     pub zero_counts: f64,
     /// Units per count.
     pub per_count: f64,
-    /// Readings at or below it are at the lower rail, counts.
+    /// Readings at or below this are at the lower rail, counts.
     pub lower_rail_counts: f64,
-    /// Readings at or above it are at the upper rail, counts.
+    /// Readings at or above this are at the upper rail, counts.
     pub upper_rail_counts: f64,
 }
 
@@ -91,7 +89,7 @@ impl RigFile {
     /// Reads and checks a file.
     ///
     /// # Errors
-    /// [`LineError::RigFile`] with the key that is wrong and what to do.
+    /// [`LineError::RigFile`] with the wrong key and the remedy.
     pub fn load(path: &Path) -> Result<Self, LineError> {
         let refused = |reason| LineError::RigFile {
             file: path.to_path_buf(),
@@ -107,10 +105,10 @@ impl RigFile {
         Ok(rig)
     }
 
-    /// Says what is wrong with the numbers, with the key.
+    /// Checks the numbers; an error names the key.
     ///
     /// # Errors
-    /// The key, what is wrong with it, and what to do.
+    /// The key, its problem, and the remedy.
     pub fn check(&self) -> Result<(), String> {
         if self.format_version != VERSION {
             return Err(format!(
@@ -127,7 +125,7 @@ impl RigFile {
         for (key, value) in positive {
             if !(value > 0.0 && single(value)) {
                 return Err(format!(
-                    "key `{key}`: {value:?} is no time or size above 0 that a board can hold"
+                    "key `{key}`: {value:?} is not a time or size above 0 that a board can represent"
                 ));
             }
         }
@@ -197,7 +195,7 @@ impl RigFile {
                 channel.upper_rail_counts,
             )?;
             for (key, text) in [("name", &channel.name), ("unit", &channel.unit)] {
-                // It becomes the header of a column, and stands in the board's constants.
+                // It becomes the header of a column and a constant of the board.
                 let acts = |c: char| c.is_control() || matches!(c, ',' | '"');
                 if text.contains(acts)
                     || visible(text) != *text
@@ -214,7 +212,7 @@ impl RigFile {
                 || ["t", "u", "y", "y_sd", "y_min", "y_max"].contains(&&*channel.name)
             {
                 return Err(format!(
-                    "key `channel.name`: `{}` is no name for a channel",
+                    "key `channel.name`: `{}` is not a valid name of a channel",
                     channel.name
                 ));
             }
@@ -225,7 +223,7 @@ impl RigFile {
     /// Writes the file.
     ///
     /// # Errors
-    /// [`LineError::Output`]; [`LineError::RigFile`] for what could not be read again.
+    /// [`LineError::Output`]; [`LineError::RigFile`] if the file could not be read again.
     pub fn save(&self, path: &Path) -> Result<(), LineError> {
         self.check().map_err(|reason| LineError::RigFile {
             file: path.to_path_buf(),
@@ -233,7 +231,8 @@ impl RigFile {
         })?;
         let body = toml::to_string(self).unwrap_or_default();
         let text = format!(
-            "# A rig, as `host-fit record --calibrate` found it; `cargo xtask firmware --rig` builds with it.\n{body}"
+            "# A rig, as measured by `host-fit record --calibrate`; `cargo xtask firmware --rig` builds the \
+                 firmware with it.\n{body}"
         );
         Ok(write_atomic(path, |out| out.write_all(text.as_bytes()))?)
     }
@@ -242,7 +241,7 @@ impl RigFile {
     #[must_use]
     pub fn hold_samples(&self) -> [u32; 2] {
         [self.valve.shortest_on_s, self.valve.shortest_off_s]
-            // A thousandth of a sample is the file's rounding.
+            // A thousandth of a sample is rounding in the file.
             .map(|time| (time / self.sample_period_s - 1e-3).ceil().max(1.0) as u32)
     }
 
@@ -253,7 +252,7 @@ impl RigFile {
     }
 }
 
-/// Whether single precision, in which a board reckons, holds the value, and holds it as something.
+/// Whether single precision, which boards use, represents the value as a finite number other than 0.
 fn single(value: f64) -> bool {
     (value as f32).is_normal() || value == 0.0
 }
@@ -261,12 +260,12 @@ fn single(value: f64) -> bool {
 fn line(of: &str, zero: f64, per_count: f64) -> Result<(), String> {
     if !single(zero) {
         return Err(format!(
-            "key `{of}.zero_counts`: {zero:?} is no number that a board can hold"
+            "key `{of}.zero_counts`: {zero:?} is not a number that a board can represent"
         ));
     }
     if !(single(per_count) && per_count != 0.0) {
         return Err(format!(
-            "key `{of}.per_count`: {per_count:?} makes every reading the same, or none"
+            "key `{of}.per_count`: with {per_count:?} all readings are equal, or none is finite"
         ));
     }
     Ok(())
@@ -275,7 +274,8 @@ fn line(of: &str, zero: f64, per_count: f64) -> Result<(), String> {
 fn rails(of: &str, lower: f64, upper: f64) -> Result<(), String> {
     if !(0.0 <= lower && lower < upper && upper <= FULL_SCALE) {
         return Err(format!(
-            "key `{of}.lower_rail_counts`, `{of}.upper_rail_counts`: {lower} and {upper} are no rails within 0 to {FULL_SCALE}"
+            "key `{of}.lower_rail_counts`, `{of}.upper_rail_counts`: {lower} and {upper} are not valid limits \
+                 within 0 to {FULL_SCALE}"
         ));
     }
     Ok(())
@@ -344,7 +344,7 @@ mod tests {
             }),
             ("stuck_after_samples", |r| r.sensor.stuck_after_samples = 0),
             ("valve.shortest_on_s", |r| r.valve.shortest_on_s = -1.0),
-            // What single precision cannot hold would be written as `inf`, or as 0.
+            // A value that single precision does not represent would be written as `inf`, or as 0.
             ("residual_envelope", |r| r.residual_envelope = 1e300),
             ("residual_envelope", |r| r.residual_envelope = 1e-300),
             ("sensor.per_count", |r| r.sensor.per_count = 1e39),

@@ -1,8 +1,8 @@
-//! The closed loop, live: shown, logged and judged.
+//! The closed loop in operation: displayed, logged and checked.
 //!
-//! The log is a data set of one record, so that `compare` and `diagnose` read it:
-//! it begins at rest, before the loop is armed, and ends at the first sample that
-//! is missing, because a record needs its whole history. The judgement goes on.
+//! The log is a data set of one record, so `compare` and `diagnose` read it. It begins at rest, before the law is
+//! armed, and ends at the first missing sample, because a free run needs the whole history. The check of the model
+//! continues.
 
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -21,11 +21,11 @@ use crate::record::MOST_SAMPLES;
 /// What is watched and how long.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plan {
-    /// Let the law have the valve after `rest_s`, and shut it in the end.
+    /// Arms the law after `rest_s`, and closes the valve at the end.
     pub arm: bool,
-    /// Rest that is logged before the loop is armed, s.
+    /// Logged rest before the law is armed, s.
     pub rest_s: f64,
-    /// How long, s; for ever if infinite.
+    /// Duration, s; infinite for no limit.
     pub duration_s: f64,
     /// Longest log, s.
     pub log_s: f64,
@@ -48,17 +48,17 @@ pub struct Now {
     pub model: Option<f64>,
     /// The valve.
     pub open: bool,
-    /// Samples that did not come so far.
+    /// Missing samples so far.
     pub lost: u64,
     /// What is known of the model.
     pub verdict: Verdict,
     /// Residual averaged over about 64 samples, y.
     pub residual: Option<f64>,
-    /// How far that is from the limit at which the board shuts the valve, as a share of the limit.
+    /// Distance of that average from the limit at which the board closes the valve, as a share of the limit.
     pub margin: Option<f64>,
 }
 
-/// What to do after a moment of the loop.
+/// The next action after a sample of the loop.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Turn {
     /// Watch on.
@@ -69,7 +69,7 @@ pub enum Turn {
     End,
 }
 
-/// A change of the law that was asked for. Serialises to the keys under `changes` of `watch --json`.
+/// A requested change of the law. Serialises to the keys under `changes` of `watch --json`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Changed {
     /// Time, s.
@@ -80,7 +80,7 @@ pub struct Changed {
     pub refused: Option<String>,
 }
 
-/// What came of it. Serialises to the keys of `watch --json`.
+/// Result of watching. Serialises to the keys of `watch --json`.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Watched {
     /// How long, s.
@@ -89,8 +89,7 @@ pub struct Watched {
     pub samples: u64,
     /// Samples that did not.
     pub lost_samples: u64,
-    /// Of the samples at which the law had the valve: root mean square of y* − y,
-    /// where the law has a reference.
+    /// While the law controls the valve: root mean square of y* − y, if the law has a reference.
     pub rms_error: Option<f64>,
     /// Root mean square of reading minus model.
     pub rms_residual: Option<f64>,
@@ -98,7 +97,7 @@ pub struct Watched {
     pub mean: Option<f64>,
     /// Share of the time with an open valve.
     pub air: Option<f64>,
-    /// Switches of the valve in a second.
+    /// Switches of the valve per second.
     pub switches_per_s: Option<f64>,
     /// The smallest distance of the averaged residual from the board's limit, as a share of the limit.
     pub least_margin: Option<f64>,
@@ -107,12 +106,12 @@ pub struct Watched {
     /// What is known of the model.
     #[serde(flatten)]
     pub verdict: Option<Verdict>,
-    /// The data set, if one was asked for.
+    /// The data set, if one was requested.
     #[serde(serialize_with = "some_text")]
     pub log: Option<PathBuf>,
     /// Samples in it.
     pub logged: u64,
-    /// Why it ended, if not by time or by hand.
+    /// The reason for an early end.
     pub ended: Option<String>,
 }
 
@@ -124,24 +123,24 @@ fn some_text<S: serde::Serializer>(path: &Option<PathBuf>, to: S) -> Result<S::O
 
 /// How long nothing may come.
 const SILENCE: Duration = Duration::from_secs(2);
-/// So long the board may answer without a new sample.
+/// Longest time in which the board may answer without a new sample.
 const NOTHING_NEW: Duration = Duration::from_secs(10);
-/// At the beginning of an armed loop the flow is far from y*; figures begin after this, s …
+/// After arming, the flow is far from y*; figures begin after this time, s …
 const SETTLING_S: f64 = 1.0;
-/// … and after so many samples: at a long period flows are slow.
+/// … and after this many samples, because flows are slow at a long period.
 const SETTLING: u64 = 1000;
 
 /// Weight of a residual in the average that the board compares with its limit.
 const SHARE: f64 = 1.0 / 64.0;
 
-/// Watches the loop behind `host`, changes it as `turn` says until that says the end, and writes the log's
-/// folder, if any.
+/// Watches the loop behind `host`, changes it as `turn` returns until that is the end, and writes the log's
+/// folder, if requested.
 ///
-/// A change is answered by the board before the next one is asked for. One that is refused is noted, and the loop
-/// goes on as before.
+/// The board answers a change before the next one is requested. A refused change is recorded, and the loop
+/// continues unchanged.
 ///
 /// # Errors
-/// [`LineError`] when the board cannot be watched.
+/// [`LineError`] if the board cannot be watched.
 pub fn watch(
     host: &mut Host,
     plan: &Plan,
@@ -175,7 +174,7 @@ pub fn watch(
         next: 0,
         phase: Phase::Disarmed,
         rows: Vec::new(),
-        // Only what begins at rest is a record.
+        // Only a log that begins at rest is a valid record.
         logs: log.is_some() && board.phase == Phase::Disarmed,
         most_rows: most_rows as usize,
         armed: Sums::default(),
@@ -209,7 +208,7 @@ pub fn watch(
         came = Instant::now();
         if let Phase::Faulted(_) = streamed.phase {
             break Some(format!(
-                "the board shut the valve: {}",
+                "the board closed the valve: {}",
                 word(streamed.phase)
             ));
         }
@@ -251,7 +250,7 @@ pub fn watch(
     Ok(watched)
 }
 
-/// Sums over the samples at which the law had the valve.
+/// Sums over the samples at which the law controls the valve.
 #[derive(Clone, Copy, Debug, Default)]
 struct Sums {
     samples: u64,
@@ -266,7 +265,7 @@ struct Sums {
 struct Watcher {
     period_s: f64,
     sensor: Scale,
-    /// What the board reckons with: the law's numbers come in its counts.
+    /// The board's scale: the law's numbers arrive in its counts.
     board: Scale,
     /// The board's limit of the averaged residual, y.
     envelope: f64,
@@ -282,7 +281,7 @@ struct Watcher {
     most_rows: usize,
     armed: Sums,
     watched: Watched,
-    /// Samples for which the law has had the valve.
+    /// Number of samples for which the law has controlled the valve.
     armed_since: u64,
     last: Option<bool>,
 }
@@ -293,7 +292,7 @@ struct Row {
 }
 
 impl Watcher {
-    /// Takes samples; the newest as it is shown.
+    /// Receives samples; the newest is displayed.
     fn take(&mut self, streamed: &Streamed) -> Option<Now> {
         let first = streamed.samples.first()?.0;
         if first < self.next {
@@ -398,7 +397,7 @@ impl Watcher {
     }
 }
 
-/// The data set, and beside the record what the law had to say.
+/// The data set, with the law's own signals in a file next to the record.
 fn write(folder: &Path, watcher: &Watcher, columns: &Columns) -> Result<(), OutputError> {
     let mut files = Staging::new(folder)?;
     let time = |k: usize| (k as f64 * watcher.period_s * 1e9).round() / 1e9;
@@ -429,12 +428,12 @@ fn write(folder: &Path, watcher: &Watcher, columns: &Columns) -> Result<(), Outp
         }
         Ok(())
     })?;
-    // The one that makes a data set of the others comes last.
+    // `dataset.toml`, which makes the folder a data set, is written last.
     files.write("dataset.toml", |out| {
         writeln!(
             out,
-            "title = \"The loop in service\"\nsample_period_s = {}\n\n[[record]]\nname = \"service\"\nfile = \
-             \"service.csv\"\nuse = \"validate\"",
+            "title = \"The closed loop in operation\"\nsample_period_s = {}\n\n[[record]]\nname = \
+             \"service\"\nfile = \"service.csv\"\nuse = \"validate\"",
             watcher.period_s
         )
     })?;

@@ -35,15 +35,15 @@ impl Drop for Browser {
     }
 }
 
-/// Makes a WebSocket of a connection to this machine (RFC 6455, 4.1). `tungstenite` could, but asks for features of
-/// dependencies that `host-fit` alone has not, and then `host-fit` is compiled twice.
+/// Makes a WebSocket of a connection to this machine (RFC 6455, 4.1). `tungstenite` could do this, but it requires
+/// features of dependencies that `host-fit` alone does not use, and `host-fit` would be compiled twice.
 fn upgrade(stream: &mut TcpStream, port: &str, path: &str) -> Result<()> {
     write!(
         stream,
         "GET {path} HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n\
          Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: MDEyMzQ1Njc4OWFiY2RlZg==\r\n\r\n"
     )?;
-    // Exactly to the end of the header: frames follow.
+    // Exactly to the end of the header, because frames follow.
     let mut answer = Vec::new();
     while !answer.ends_with(b"\r\n\r\n") {
         let mut byte = [0];
@@ -61,7 +61,7 @@ impl Browser {
     /// Starts chromium.
     ///
     /// # Errors
-    /// When it is not installed (`cargo xtask setup` does) or does not answer.
+    /// If it is not installed (`cargo xtask setup` installs it) or does not answer.
     pub fn start() -> Result<Self> {
         let profile = tempfile::tempdir()?;
         let child = Command::new("chromium")
@@ -227,7 +227,7 @@ impl Browser {
     /// Waits until an expression is true.
     ///
     /// # Errors
-    /// When it is not within so many seconds.
+    /// If it is not true within this many seconds.
     pub fn wait(&mut self, page: &Page, expression: &str, seconds: u64) -> Result<()> {
         let started = Instant::now();
         while started.elapsed() < Duration::from_secs(seconds) {
@@ -276,7 +276,7 @@ impl Browser {
     /// A screenshot of the visible part, PNG.
     ///
     /// # Errors
-    /// When it cannot be taken or written.
+    /// If it cannot be taken or written.
     pub fn screenshot(&mut self, page: &Page, path: &Path) -> Result<()> {
         use base64::Engine as _;
         let taken = self.on(page, "Page.captureScreenshot", &json!({"format": "png"}))?;

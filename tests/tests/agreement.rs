@@ -1,5 +1,5 @@
-//! Exported models: all of them are compared by `cargo xtask agreement`, some here; and no text of a model file becomes
-//! code in any language.
+//! Exported models: `cargo xtask agreement` compares all of them; here some are compared. A further test checks
+//! that no text of a model file becomes code in any language.
 
 use host_fit::codegen::portable::{self, Precision};
 use host_fit::codegen::{Language, write};
@@ -24,7 +24,7 @@ fn exported_models_say_what_the_host_says() {
     }
 }
 
-/// Ends every kind of comment and string that there is.
+/// Text that ends every kind of comment and string.
 const HOSTILE: &str = "x */ #error\n#error injected\r\nraise SystemExit(7)\n\"\"\"\n'; error('injected'); %{\n\\\n??/\n\u{2028}error(1)";
 
 #[test]
@@ -58,7 +58,7 @@ starts = [0.1]
     model.define(definition).expect("no other");
     model.add(definition.spec(), &[0.1], Some(10.0));
     model.effects[0].channel = Some(HOSTILE.to_owned());
-    // Compiled and run; what got out of a comment or string would not parse, or end the run.
+    // Compiled and run; text that escaped from a comment or string would not parse, or would end the run.
     let case = Case {
         name: "hostile".to_owned(),
         model: model.clone(),

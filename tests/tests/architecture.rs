@@ -1,4 +1,5 @@
-//! The architecture page and the code agree: crates point one way, and rooms of the library use the rooms below them.
+//! The architecture page agrees with the code: dependencies of crates have one direction, and rooms of the library
+//! use only the rooms below them.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -11,7 +12,7 @@ fn read(path: impl AsRef<Path>) -> String {
     std::fs::read_to_string(root().join(path)).expect("a file of the project")
 }
 
-/// The crates of this project that `package` depends on, not counting what its tests use.
+/// The crates of this project on which `package` depends, without those of its tests.
 fn dependencies(package: &str) -> BTreeSet<String> {
     let manifest: toml::Table = read(format!("{package}/Cargo.toml")).parse().expect("TOML");
     let listed = manifest.get("dependencies").and_then(|d| d.as_table());
@@ -20,7 +21,7 @@ fn dependencies(package: &str) -> BTreeSet<String> {
     names.filter(ours).collect()
 }
 
-/// From bottom to top, with what each may know.
+/// From bottom to top, with the allowed dependencies of each.
 const CRATES: [(&str, &[&str]); 8] = [
     ("model-core", &[]),
     ("wire", &["model-core"]),
@@ -31,7 +32,8 @@ const CRATES: [(&str, &[&str]); 8] = [
     ("firmware-sim", &["closed-loop", "recordings"]),
     (
         "host-fit",
-        // Simulator, line and workbench are for the program alone: optional dependencies, see the CI step "library alone".
+        // Simulator, line and workbench serve the program only: they are optional dependencies, see the CI step
+        // "library alone".
         &[
             "closed-loop",
             "firmware-sim",
@@ -68,7 +70,7 @@ fn rooms() -> Vec<String> {
         .collect()
 }
 
-/// Sources of a room without their unit tests and files that are tests alone.
+/// Sources of a room without unit tests and test files.
 fn sources(path: &Path) -> Vec<(PathBuf, String)> {
     if path.is_dir() {
         let entries = std::fs::read_dir(path).expect("a folder");
@@ -89,7 +91,7 @@ fn sources(path: &Path) -> Vec<(PathBuf, String)> {
     vec![(path.to_owned(), code.collect::<Vec<_>>().join("\n"))]
 }
 
-/// Names that stand behind `crate::`, also those in braces.
+/// Names after `crate::`, also those in braces.
 fn used(code: &str) -> Vec<String> {
     let mut names = Vec::new();
     for (at, word) in code.match_indices("crate::") {
@@ -100,7 +102,7 @@ fn used(code: &str) -> Vec<String> {
                 .collect()
         };
         match rest.strip_prefix('{') {
-            // One level is enough: what follows a comma in nested braces is no room's name.
+            // One level is enough: names after a comma in nested braces are not rooms.
             Some(list) => names.extend(list.split(';').next().unwrap_or("").split(',').map(name)),
             None => names.push(name(rest)),
         }
@@ -128,7 +130,7 @@ fn rooms_use_the_rooms_below_them() {
             folder.with_extension("rs")
         };
         for (file, code) in sources(&path) {
-            // A file of tests alone may use what it likes.
+            // A file of tests may use any room.
             if file.ends_with("residual/plants.rs") {
                 continue;
             }

@@ -1,4 +1,5 @@
-//! The first pages print what the program prints: their commands are run, and their results stand in them word by word.
+//! The first pages contain the output of the program: their commands are run, and the results must be on them word
+//! for word.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -36,7 +37,7 @@ fn the_first_ten_minutes_print_what_the_page_says() {
             .expect("the program starts");
         let text = String::from_utf8(output.stdout).expect("UTF-8");
         assert!(output.status.success(), "{text}");
-        // The answer down to its next command.
+        // The answer up to its next command.
         for line in text.lines() {
             assert!(page.contains(line), "`{line}` is not on the page");
             if line.starts_with("  Next:") {

@@ -1,4 +1,4 @@
-//! The bundled simulated sets are what their README says they are.
+//! The bundled simulated sets agree with their README.
 
 use std::path::{Path, PathBuf};
 

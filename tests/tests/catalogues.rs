@@ -1,4 +1,4 @@
-//! The catalogue of the model and that of the plants are the same, though they share no code.
+//! The catalogues of the model and of the plants agree, although they share no code.
 
 use firmware_sim::plant::{BasePlant, Effect};
 use model_core::effects::SPECS;
@@ -16,7 +16,8 @@ fn names_parameters_units_and_channels_are_the_same() {
     assert_eq!(names, plants);
     for spec in SPECS {
         let effect = Effect::draw(spec.name, &base, &mut rng).expect("a plant's effect");
-        // What a model file may leave out need not be one of the plant's: its rigs set the command before they read.
+        // A parameter that a model file may omit need not exist in the plant: its rigs set the command before they
+        // read.
         let stated = spec.parameters.iter().filter(|p| p.left_out.is_none());
         let model = stated.map(|p| (p.name, p.unit.to_string()));
         let plant = effect.parameters().into_iter();
@@ -27,7 +28,7 @@ fn names_parameters_units_and_channels_are_the_same() {
     }
 }
 
-/// What a rig usually has must be what the model may search.
+/// The usual values of a rig must be within the search range of the model.
 #[test]
 fn usual_values_lie_within_the_range_that_the_model_searches() {
     for spec in SPECS {

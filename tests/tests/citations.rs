@@ -1,4 +1,4 @@
-//! What comments and pages cite is there: sections and equations of `docs/theory*.md`, pages, headings.
+//! Citations in comments and pages exist: sections and equations of `docs/theory*.md`, pages, headings.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -15,7 +15,7 @@ fn files() -> Vec<(PathBuf, String)> {
         for entry in std::fs::read_dir(&folder).expect("a folder") {
             let path = entry.expect("an entry").path();
             let name = path.file_name().unwrap_or_default().to_string_lossy();
-            // What is built and what others wrote is not ours.
+            // Build products and third-party files are skipped.
             let ours = !matches!(&*name, "target" | "out" | "node_modules");
             if path.is_dir() && !name.starts_with('.') && ours {
                 folders.push(path);
@@ -60,7 +60,7 @@ fn cited(text: &str, word: &str, label: fn(&str) -> Option<(&str, &str)>) -> Vec
     labels
 }
 
-/// `3.1` at the start of a text, and what follows.
+/// `3.1` at the start of a text, and the remaining text.
 fn section(text: &str) -> Option<(&str, &str)> {
     let end = text.find(|c: char| !(c.is_ascii_digit() || c == '.'));
     let (label, rest) = text.split_at(end.unwrap_or(text.len()));
@@ -71,7 +71,7 @@ fn section(text: &str) -> Option<(&str, &str)> {
         .filter(|_| !rest.starts_with(" s"))
 }
 
-/// `(3)` at the start of a text, and what follows.
+/// `(3)` at the start of a text, and the remaining text.
 fn equation(text: &str) -> Option<(&str, &str)> {
     let (label, rest) = text.strip_prefix('(')?.split_once(')')?;
     let digits = !label.is_empty() && label.chars().all(|c| c.is_ascii_digit());
@@ -101,7 +101,7 @@ fn every_cited_section_and_equation_stands_on_the_theory_page() {
             }
         }
     }
-    // A reader of comments that finds none would hold nothing.
+    // Without this check a reader that finds no comments would pass the test.
     assert!(
         of_sections > 20 && of_equations > 60,
         "{of_sections} {of_equations}"

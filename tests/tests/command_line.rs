@@ -1,4 +1,4 @@
-//! The program as its users meet it: exit codes, JSON shapes, messages, files.
+//! The program from the user's side: exit codes, JSON shapes, messages, files.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -88,7 +88,7 @@ fn wrong_usage_is_exit_2() {
     assert_eq!(run(&[p("--help")]).status.code(), Some(0));
 }
 
-/// `--set` changes a rule for one run, and what is decided by it.
+/// `--set` changes a rule for one run, and the decision that depends on it.
 #[test]
 fn a_rule_is_changed_for_a_run() {
     let listed = |change: &[&str]| {
@@ -181,7 +181,7 @@ fn several_models_are_compared_side_by_side() {
                 "where",
             ],
         );
-        // What it says of each is what it says of that one alone.
+        // The result for each model equals that for the model alone.
         let alone = json(&[p("compare"), model, &set]);
         assert_eq!(listed["records"], alone["records"]);
         let name = model.file_stem().expect("a name").to_string_lossy();
@@ -257,7 +257,7 @@ fn a_comparison_leaves_a_page_and_pictures() {
     );
     let page = std::fs::read_to_string(page).expect("the page");
     assert!(page.starts_with("<!doctype html>") && page.contains("<svg"));
-    // It carries its own script and fetches nothing.
+    // It contains its own script and loads nothing from the network.
     assert!(page.contains("Content-Security-Policy") && !page.contains("<script src"));
     assert_eq!(std::fs::read_dir(pictures).expect("pictures").count(), 8);
 }
@@ -296,7 +296,7 @@ fn simulate_is_the_models_free_run() {
     assert_eq!(written.lines().count(), 3001);
 }
 
-/// That part of the bundled set, saved into `folder`; the page of the first ten minutes is tested on the whole of it.
+/// That part of the bundled set, saved into `folder`; the page of the first ten minutes is tested on the whole set.
 fn part_of_the_ramp(folder: &Path) -> PathBuf {
     let path = folder.join("ramp");
     let set = DataSet::load(&data("hidden-ramp")).expect("bundled");
@@ -305,7 +305,7 @@ fn part_of_the_ramp(folder: &Path) -> PathBuf {
     path
 }
 
-/// For a `design` that is asked for its contract: trials of half the length, and a coarse robustness margin.
+/// For tests of the contract of `design`: trials of half the length, and a coarse robustness margin.
 const QUICK: [&str; 8] = [
     "--set",
     "design.trial=6000",
@@ -350,7 +350,7 @@ fn extend_finds_the_hidden_plenum() {
     );
     let after = &found["after"];
     assert!(number(&after["rmse"]) < 1.05 * number(&after["noise_rmse"]));
-    // The same run again gives the same file, and what was written scores what was said.
+    // The same run again gives the same file, and the written model has the printed error.
     let first = std::fs::read(&out).expect("written");
     json(&arguments);
     assert_eq!(std::fs::read(&out).expect("written"), first);
@@ -414,7 +414,7 @@ fn diagnose_names_the_hidden_plenum() {
     let number = |value: &Value| value.as_f64().expect("a number");
     let last = ladder.last().expect("a rung");
     assert!(number(&last["validate_rmse"]) < 1.05 * number(&last["noise_rmse"]));
-    // What was written scores what the ladder says, before and after.
+    // The written models have the errors of the ladder, before and after.
     let after = json(&[p("compare"), &out, &ramp]);
     let apart = number(&after["validate"]["rmse"]) / number(&last["validate_rmse"]) - 1.0;
     assert!(apart.abs() < 1e-9, "{apart}");
@@ -509,7 +509,8 @@ fn bad_input_is_one_paragraph_and_leaves_no_file() {
     assert_eq!(left.count(), 6, "only what the test wrote");
 }
 
-/// The simulator has no plant for a user's own effect: the law is written all the same, tried on a plant without it.
+/// The simulator has no plant for a user's own effect: the law is written nevertheless and tried on a plant without
+/// the effect.
 #[test]
 fn a_law_is_designed_for_a_model_with_an_effect_of_ones_own() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -554,8 +555,8 @@ fn paper_model(folder: &Path) -> PathBuf {
     path
 }
 
-/// At half the friction an unknown King's law costs attachment (docs/law.md). No record supports it: the law is written
-/// with a warning, and the constants do not speak of it.
+/// At half the friction an unknown King's law costs attachment (docs/law.md). The records do not support it, so the
+/// law is written with a warning, and the constants do not mention it.
 #[test]
 fn stress_warns_and_refuses_nothing() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -587,7 +588,7 @@ fn stress_warns_and_refuses_nothing() {
     assert!(!text.contains("ATTACHMENT"), "{text}");
 }
 
-/// A flow of first order, of 0.2 s behind a constant delay.
+/// A first-order flow with a time constant of 0.2 s and a constant delay.
 const FIRST_ORDER: &str = r#"
 format_version = 1
 sample_period_s = 0.001
@@ -606,8 +607,8 @@ law = "fixed"
 delays = [40]
 "#;
 
-/// A valve that stays closed for 0.6 s lets the model's own flow go: no file, the targets that pass, and by force a
-/// file and constants that say so.
+/// With a valve that stays closed for 0.6 s, attachment is lost on the model itself. No file is written and the
+/// targets that pass are listed; with `--force`, the file and the constants state the loss.
 #[test]
 fn a_law_that_loses_its_own_model_is_refused_with_the_targets_that_pass() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -615,7 +616,7 @@ fn a_law_that_loses_its_own_model_is_refused_with_the_targets_that_pass() {
     let (controlled, constants) = (path("c.toml"), path("c.rs"));
     let model = path("m.toml");
     std::fs::write(&model, FIRST_ORDER).expect("a file");
-    // Trials half as long decide the same, and three other targets of nine are enough.
+    // Trials of half the length give the same decision, and three of nine other targets suffice.
     let arguments = [
         &[p("design"), &model, p("-o"), &controlled][..],
         &[p("--target"), p("0.5"), p("--min-off"), p("0.6")],
@@ -643,8 +644,8 @@ fn a_law_that_loses_its_own_model_is_refused_with_the_targets_that_pass() {
     assert!(text.contains("LOSES ATTACHMENT with the model itself"));
 }
 
-/// Records in volts on an offset: target, interval and trials are in volts, the law is the one of the same records in
-/// units of friction, and times shorter than the records' are refused.
+/// Records in volts with an offset: target, interval and trials are in volts, the law equals that for the same
+/// records in units of friction, and times shorter than those of the records are refused.
 #[test]
 fn a_law_is_asked_for_in_the_units_of_the_sensor() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -737,7 +738,7 @@ fn files_of_other_programs_become_a_data_set() {
     let set = host_fit::data::DataSet::load(&out).expect("a data set");
     assert_eq!(found["hash"], set.hash);
     assert!(set.is_on_off());
-    // The next run of the rig is read as the first was.
+    // The next run of the rig is imported like the first.
     let (next, other) = (made("german.csv"), folder.path().join("other"));
     let like = [p("import"), &next, p("-o"), &other, p("--like"), &out];
     refused(&like, &["german.csv", "no variable `valve`", "`Zeit` (40)"]);

@@ -1,4 +1,4 @@
-//! The schemas and the page of the file formats say what the loaders do.
+//! The schemas and the page of the file formats agree with the loaders.
 
 use host_fit::data::DataSet;
 use host_fit::model::Model;
@@ -72,7 +72,7 @@ fn object_fits(schema: &Value, table: &Map<String, Value>) -> bool {
     needed.iter().all(has) && table.iter().all(known)
 }
 
-/// `value` with every key of every table left out once, and a strange one put in once.
+/// `value` with every key of every table left out once, and an unknown key added once.
 fn changed(value: &Value) -> Vec<(String, Value)> {
     let mut all = Vec::new();
     match value {
@@ -109,7 +109,7 @@ fn as_toml(value: &Value) -> String {
     toml::to_string(value).expect("TOML")
 }
 
-/// What depends on other keys, which no schema says: a law's own parameters, an effect's.
+/// Keys that depend on other keys, which a schema cannot state: the parameters of a law or an effect.
 fn depends(path: &str) -> bool {
     [
         "delay.",
@@ -189,7 +189,7 @@ fn the_schema_of_data_sets_takes_what_the_loader_takes() {
     value["title"] = json!("a title");
     assert!(fits(&schema, &value) && loads(&value));
     for (key, other) in changed(&value) {
-        // A data set without records is refused, which is no matter of keys.
+        // A data set without records is refused for another reason than its keys.
         if key != "record" {
             assert_eq!(fits(&schema, &other), loads(&other), "{key}");
         }

@@ -1,5 +1,5 @@
-//! A small draw of the hidden-effects campaign, with seeds of its own; the whole of it is
-//! `cargo xtask hidden-effects`. Tests that take minutes run in `cargo xtask kept-rigs`.
+//! A small sample of the hidden-effects campaign, with separate seeds; the whole campaign is `cargo xtask
+//! hidden-effects`. Tests that take minutes run in `cargo xtask kept-rigs`.
 
 use std::time::Duration;
 
@@ -13,18 +13,18 @@ fn diagnosed(group: Group, family: Family, hidden: &[&str], seed: u64) -> Row {
     })
 }
 
-/// What is said of a part of the records.
+/// The answer for a part of the records.
 fn asked(case: &Case) -> Row {
     asked_of(case, Some(Part::THIRD))
 }
 
-/// What is said of all records, where a part of them does not show what the test is about.
+/// The answer for all records, if a part of them does not show the property under test.
 fn asked_of_all(case: &Case) -> Row {
     asked_of(case, None)
 }
 
 fn asked_of(case: &Case, part: Option<Part>) -> Row {
-    // A guard against a search that never ends; other steps of CI may run beside.
+    // A limit for a search that never ends; other steps of CI may run at the same time.
     let program = Program {
         part,
         ..Program::new(scenarios::program(), Duration::from_secs(900))
@@ -61,15 +61,15 @@ fn bad_delays_in_the_given_model_are_no_missing_effect() {
     is_found(&row);
 }
 
-/// What `identify` makes of it has the memory; so nothing is missing.
+/// The identified model contains the memory, so nothing is missing.
 #[test]
 fn a_memory_of_the_flow_is_no_missing_effect() {
     let row = asked(&Case::new(Group::Nothing, Family::Memory1, &[], 713));
     is_found(&row);
 }
 
-/// What `identify` makes of the rig alone is near the noise level: a wake that nobody saw begin, and a delay
-/// that shortens up to a level only.
+/// The identified model alone is near the noise level: a wake with an unknown initial state, and a delay that
+/// shortens only up to a level.
 #[test]
 #[ignore = "half a minute of processor time: cargo xtask kept-rigs"]
 fn the_default_model_comes_near_the_noise_in_mid_run_and_under_other_laws() {
@@ -78,7 +78,7 @@ fn the_default_model_comes_near_the_noise_in_mid_run_and_under_other_laws() {
         ..Case::new(Group::Nothing, Family::Wake, &[], 2_026_200_179)
     };
     let saturating = Case::new(Group::Nothing, Family::RateOfY, &[], 3_131_200_114);
-    // At 1.06 × the noise something is unexplained, and it has no name.
+    // At 1.06 × the noise level something is unexplained, and it gets no name.
     for (case, verdict) in [(in_mid_run, "unexplained"), (saturating, "nothing-missing")] {
         let row = asked_of_all(&case);
         assert_eq!(row.verdict, verdict, "{case}");
@@ -90,12 +90,12 @@ fn the_default_model_comes_near_the_noise_in_mid_run_and_under_other_laws() {
     }
 }
 
-/// The level of each record is off by a per cent, as the tunnel's speed never comes back exactly: no effect bends to that, and
-/// the base is the flow's, a rate that depends on y.
+/// The level of each record is off by one per cent, because the tunnel's speed is not exactly repeatable. No effect
+/// may imitate that, and the base must contain the flow's level-dependent rate.
 #[test]
 #[ignore = "half a minute of processor time: cargo xtask kept-rigs"]
 fn what_scatters_between_repeats_gets_no_name() {
-    // On a part of the records the scatter leaves nothing above the noise, which would test nothing.
+    // On a part of the records the scatter leaves no error above the noise, and the test would be empty.
     let row = asked_of_all(&Case {
         noise: NoiseKind::Scatter,
         ..Case::new(Group::Nothing, Family::RateOfY, &[], 2_026_200_270)
@@ -103,7 +103,8 @@ fn what_scatters_between_repeats_gets_no_name() {
     assert_eq!(row.verdict, "nothing-missing", "{}", row.said());
 }
 
-/// No command reaches a full jet, and yet they are shares of one: the rate that depends on y is in the base then.
+/// No command reaches a full jet, although the commands are fractions of one; the base then contains the
+/// level-dependent rate.
 #[test]
 fn graded_commands_below_a_full_jet_leave_nothing_to_name() {
     let row = asked(&Case {
@@ -114,7 +115,8 @@ fn graded_commands_below_a_full_jet_leave_nothing_to_name() {
     assert!(row.is_at_floor(), "{:?}", row.over_floor);
 }
 
-/// Beside its lag an echo of three per cent would take what the second order of the valve leaves; another lag of the flow does too.
+/// With its lag in the model, an echo of three per cent would imitate the second order of the valve; so does
+/// another lag of the flow.
 #[test]
 #[ignore = "two minutes of two cores: cargo xtask kept-rigs"]
 fn a_valve_of_second_order_is_a_valve_and_no_echo() {
@@ -130,7 +132,8 @@ fn a_valve_of_second_order_is_a_valve_and_no_echo() {
     assert_eq!(row.missing, ["valve-lag"], "{}", row.said());
 }
 
-/// In the first round the edges' delay comes with a valve's lag at the end of its range, which hides it.
+/// In the first round the edge-dependent delay comes with a valve lag at the end of its range, which would exclude
+/// it.
 #[test]
 #[ignore = "two minutes of processor time: cargo xtask kept-rigs"]
 fn what_was_added_with_a_stand_in_stays_without_it() {
@@ -142,7 +145,8 @@ fn what_was_added_with_a_stand_in_stays_without_it() {
     assert!(row.is_at_floor(), "{:?}", row.over_floor);
 }
 
-/// Beside a wake alone the best King's law has a ratio at the end of its range; the flow's rate depends on y as well.
+/// With a wake alone the best King's law has a ratio at the end of its range, because the flow's rate depends on y
+/// as well.
 #[test]
 #[ignore = "two minutes of processor time: cargo xtask kept-rigs"]
 fn an_effect_at_a_bound_beside_a_lean_base_is_found_in_the_end() {
@@ -162,7 +166,8 @@ fn an_effect_at_a_bound_beside_a_lean_base_is_found_in_the_end() {
     assert!(row.is_at_floor(), "{:?}", row.over_floor);
 }
 
-/// The lags of the given model reach 1.01 × the noise level without the droop; fewer lags and the droop do it better.
+/// The lags of the given model reach 1.01 × the noise level without the droop; fewer lags and the droop reach a
+/// lower error.
 #[test]
 #[ignore = "half a minute of processor time: cargo xtask kept-rigs"]
 fn an_effect_that_the_given_lags_imitate_is_found() {
@@ -191,7 +196,7 @@ fn an_effect_beside_a_memory_of_the_flow_is_found_alone() {
     is_found_with_its_parameters(&row);
 }
 
-/// The same samples, twenty times as slow and fifty times as small.
+/// The same samples, with times multiplied by twenty and y divided by fifty.
 #[test]
 fn other_units_change_no_name_and_transform_the_parameters() {
     let units = [
@@ -220,7 +225,7 @@ fn other_units_change_no_name_and_transform_the_parameters() {
     }
 }
 
-/// The paper's own step: a fixed-delay model of a flow whose delay follows its state.
+/// The paper's own step: a fixed-delay model of a flow with a state-dependent delay.
 #[test]
 fn a_state_dependent_delay_is_the_first_hidden_effect() {
     let row = diagnosed(
@@ -239,8 +244,8 @@ fn an_effect_of_the_flow_is_found_with_its_parameters() {
     is_found_with_its_parameters(&row);
 }
 
-/// Hysteresis alone bends to imitate the friction as well, and friction added to it
-/// so bent finds nothing left: they are found the other way round.
+/// Hysteresis alone imitates the friction as well, and friction added to it then gains nothing: they are found in
+/// the other order.
 #[test]
 #[ignore = "90 s of processor time: cargo xtask kept-rigs"]
 fn two_effects_of_which_one_imitates_both_are_found() {

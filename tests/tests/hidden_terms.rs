@@ -1,5 +1,5 @@
-//! A small draw of the hidden-terms campaign on short records, with seeds of its own; the whole of it is
-//! `cargo xtask hidden-terms`.
+//! A small sample of the hidden-terms campaign on short records, with separate seeds; the whole campaign is `cargo
+//! xtask hidden-terms`.
 
 use firmware_sim::family::Family;
 use firmware_sim::plant::RateLaw;
@@ -10,7 +10,7 @@ use host_fit::steps::discover;
 use scenarios::campaign::terms::Row;
 use scenarios::campaign::{Case, Group, Part};
 
-/// A rough guess, as an engineer would hand it in.
+/// A rough guess, like a model made by hand.
 const GUESS: &str = r#"
 format_version = 1
 sample_period_s = 0.001
@@ -47,7 +47,7 @@ fn asked(group: Group, family: Family, hidden: &[&str], seed: u64) -> Row {
     let start = std::time::Instant::now();
     let found = discover(&guess, &set, &options, &()).expect("a search");
     let document = serde_json::to_value(&found).expect("a document");
-    // Only what cannot be told apart comes with the command that would.
+    // Only terms that are not distinguishable come with an experiment.
     let alone = |term: &FoundTerm| term.alike.is_empty();
     let is_alone = found.discovery.terms.iter().all(alone);
     assert!(
@@ -80,7 +80,8 @@ fn is_found(family: Family, hidden: &str, seed: u64) {
 #[test]
 #[ignore = "the demo finds one in CI; this one: cargo xtask kept-rigs"]
 fn a_jet_that_tires_with_every_pulse_is_found() {
-    // Where a part jet changes the level and not the rate, a sensor that tires shows the same.
+    // If a part jet changes the level and not the rate, a sensor with decreasing sensitivity gives the same
+    // readings.
     let bilinear = |seed: &u64| {
         let case = Case::new(Group::Beyond, Family::FirstOrder, &["tiring-jet"], *seed);
         let plan = case.plan().expect("a rig");

@@ -1,4 +1,4 @@
-//! The valve's hold times are kept whatever the law is shown.
+//! The valve's hold times are kept for any input of the law.
 
 use closed_loop::{Controller, OpenLoop, Relay, TrackingController};
 use model_core::Parts;
@@ -31,7 +31,7 @@ fn small_model() -> Small {
     }
 }
 
-/// Fails if a position was left too early; a valve closed since ever may open at once.
+/// Fails if a position was left too early; a valve that has always been closed may open at once.
 fn kept(times: HoldTimes, valve: &[bool]) -> Result<(), TestCaseError> {
     let (mut position, mut length) = (false, u32::MAX);
     for &on in valve {
@@ -52,7 +52,7 @@ fn hold_times() -> impl Strategy<Value = HoldTimes> {
     (0_u32..20, 0_u32..20).prop_map(|(on, off)| HoldTimes { on, off })
 }
 
-/// Readings of every kind: sensible, absurd, not numbers, missing.
+/// Readings of every kind: plausible, extreme, NaN, missing.
 fn reading() -> impl Strategy<Value = Option<f64>> {
     prop_oneof![
         6 => (-0.5..1.5_f64).prop_map(Some),
@@ -70,7 +70,7 @@ proptest! {
         let mut hold = Hold::closed();
         let valve: Vec<bool> = wanted.iter().map(|w| hold.pass(&times, *w)).collect();
         kept(times, &valve)?;
-        // It delays, it does not invent: the valve only moves to what is wanted.
+        // It delays requests and adds none: the valve only moves to a requested position.
         for (k, on) in valve.iter().enumerate() {
             let before = k > 0 && valve[k - 1];
             prop_assert!(*on == before || *on == wanted[k]);

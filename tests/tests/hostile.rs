@@ -1,5 +1,6 @@
-//! Files and options that are sized to abort the program, hang it, or make it say what is wrong: each kind with the least of its
-//! inputs. Every command ends within its time, with one paragraph that names the key, the file or the option.
+//! Files and options that could abort the program, exhaust its time or memory, or give a wrong message: one minimal
+//! input of each kind. Every command must end within its time limit, with one paragraph that names the key, the
+//! file or the option.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -40,7 +41,7 @@ impl Room {
     }
 }
 
-/// Runs the program; it has half a minute.
+/// Runs the program with a limit of half a minute.
 #[track_caller]
 fn run(arguments: &[&str]) -> Output {
     let mut child = Command::new(program())
@@ -60,7 +61,7 @@ fn run(arguments: &[&str]) -> Output {
     child.wait_with_output().expect("its output")
 }
 
-/// Exit 1 and one paragraph with every part, of characters that are seen.
+/// Exit 1 and one paragraph with every part, of visible characters.
 #[track_caller]
 fn refused(arguments: &[&str], parts: &[&str]) -> String {
     let output = run(arguments);
@@ -85,7 +86,8 @@ fn done(arguments: &[&str]) -> Output {
     output
 }
 
-/// Values of a model file that ask for memory or time, or are none: refused by every command that reads one.
+/// Values of a model file that require too much memory or time, or are not finite: refused by every command that
+/// reads a model.
 #[test]
 fn values_of_a_model_are_checked_when_it_is_loaded() {
     let room = Room::new();
@@ -110,7 +112,7 @@ fn values_of_a_model_are_checked_when_it_is_loaded() {
     assert!(!room.path("o").exists());
 }
 
-/// Long lags, horizons and hold times: an answer or a refusal, soon.
+/// Long lags, horizons and hold times: an answer or a refusal within the time limit.
 #[test]
 fn no_design_goes_on_for_ever() {
     let room = Room::new();
@@ -136,7 +138,7 @@ fn no_design_goes_on_for_ever() {
     }
 }
 
-/// Memory is counted before it is asked for, and the limit can be moved.
+/// The need for memory is computed before the allocation, and the limit can be changed.
 #[test]
 fn memory_is_counted_before_it_is_asked_for() {
     let room = Room::new();
@@ -185,7 +187,7 @@ fn memory_is_counted_before_it_is_asked_for() {
     assert_eq!(run(&["effects", "--memory", "0"]).status.code(), Some(2));
 }
 
-/// What one command writes the next one reads.
+/// The output of one command is readable by the next.
 #[test]
 fn what_is_written_can_be_read() {
     let room = Room::new();
@@ -223,7 +225,8 @@ fn what_is_written_can_be_read() {
     refused(&["import", &late, "-o", &room.named("out")], &["late.csv"]);
 }
 
-/// Names that act on a terminal are written out, in messages, documents and generated code; a path is any bytes.
+/// Names that control a terminal are escaped in messages, documents and generated code; a path may contain any
+/// bytes.
 #[test]
 fn names_are_shown_and_do_not_act() {
     let room = Room::new();
@@ -271,8 +274,8 @@ fn names_are_shown_and_do_not_act() {
     }
 }
 
-/// What a rig file says goes into constants of single precision.
-/// The data are not there either: what is told first shows that nothing was read before.
+/// Values of a rig file become constants in single precision. The data do not exist either: the first error shows
+/// that nothing was read before.
 #[test]
 fn an_output_that_cannot_be_written_is_refused_before_anything_is_read() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -340,7 +343,8 @@ fn a_rig_that_single_precision_cannot_hold_is_refused() {
     done(&["codegen", &model, "--rig", &rig, "-o", &out]);
 }
 
-/// The unit of y is nobody's business: what is unstable at 1 is so at 1e-30 and at 1e12, and nothing else is.
+/// The unit of y must not matter: a model that is unstable at 1 is also unstable at 1e-30 and at 1e12, and a stable
+/// one is stable.
 #[test]
 fn stability_does_not_depend_on_the_unit() {
     let room = Room::new();
@@ -383,7 +387,7 @@ fn stability_does_not_depend_on_the_unit() {
     }
 }
 
-/// Ctrl-C ends every command that works for long, soon, and leaves no half file.
+/// Ctrl-C ends every long command soon, without partial files.
 #[cfg(target_os = "linux")]
 #[test]
 fn ctrl_c_ends_every_command() {
@@ -412,7 +416,8 @@ fn ctrl_c_ends_every_command() {
     for command in commands {
         for after in [0.1, 1.0] {
             let said = fs::File::create(room.path("said.json")).expect("a file");
-            // Behind a `&` of a shell the signal is ignored until the program asks for it, and one before that is lost.
+            // After a `&` of a shell the signal is ignored until the program requests it, and a signal before that
+            // is lost.
             let child = Command::new("env")
                 .arg("--default-signal=INT")
                 .arg(program())
@@ -437,7 +442,7 @@ fn ctrl_c_ends_every_command() {
                 }
                 std::thread::sleep(Duration::from_millis(10));
             }
-            // What it has found so far may be a result, and says so.
+            // The result so far may be returned; a message then says so.
             if works && child.wait().expect("a child").success() {
                 let said = fs::read_to_string(room.path("said.json")).expect("an answer");
                 assert!(said.contains("interrupted"), "{command:?} after {after} s");
@@ -454,7 +459,7 @@ fn ctrl_c_ends_every_command() {
     }
 }
 
-/// A text may be checked at every keystroke: nothing of it is kept.
+/// A text may be checked at every keystroke without being stored.
 #[cfg(target_os = "linux")]
 #[test]
 fn checking_a_text_keeps_nothing() {

@@ -1,4 +1,4 @@
-//! `host-fit identify` as a script meets it: keys, seeds, threads, options.
+//! `host-fit identify` from a script: keys, seeds, threads, options.
 
 use std::path::Path;
 use std::process::{Command, Output};
@@ -103,7 +103,7 @@ fn a_seed_repeats_bit_for_bit_with_any_number_of_threads() {
     for objective in ["one-step", "free-run"] {
         let run = |more: &[&str]| {
             let mut options = small(&["--objective", objective, "--evaluations", "400"]);
-            // The last `--objective` would be refused as doubled.
+            // The last `--objective` would be refused as a duplicate.
             options.drain(6..8);
             options.extend(more);
             let (mut document, model) = found("ramp-cfd", &options);
@@ -161,7 +161,7 @@ fn every_kind_of_model_is_identified() {
     assert_eq!(document["delays"]["factors"], serde_json::json!([]));
 }
 
-/// The averaged model is refined on the averages that it imitates.
+/// The averaged model is refined on the averages that it describes.
 #[test]
 fn averaged_models_are_refined_on_their_free_run() {
     let options = [
@@ -187,7 +187,8 @@ fn averaged_models_are_refined_on_their_free_run() {
     );
 }
 
-/// Delay laws that do better on validation are kept (the flow simulation), those that do not give way to a constant delay.
+/// Delay laws with a lower validation error are kept (the flow simulation); other laws are replaced by a constant
+/// delay.
 #[test]
 fn the_validation_error_decides_between_a_law_and_a_constant_delay() {
     let sizes = ["--n1", "2", "--n2", "2", "--max-lag", "150"];
@@ -222,7 +223,7 @@ fn factors_need_a_law() {
     }
 }
 
-/// Ctrl-C: the best so far, as a model file. On a busy machine the first wait may end before there is one.
+/// Ctrl-C returns the best model so far. On a busy machine the first wait may end before there is one.
 #[cfg(unix)]
 #[test]
 fn an_interrupt_keeps_the_best_so_far() {
@@ -238,7 +239,7 @@ fn an_interrupt_keeps_the_best_so_far() {
     assert!(is_written);
 }
 
-/// A search that is not over by then, and is told to stop.
+/// A search that is still running at that time, and is told to stop.
 #[cfg(unix)]
 fn interrupted_after(seconds: f64, model: &Path) -> Output {
     let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("../data/paper-like");

@@ -1,9 +1,10 @@
-//! What must not change the answer of the program: a few rigs; `cargo xtask invariances` has two hundred.
+//! Changes that must not change the answer of the program, on a few rigs; `cargo xtask invariances` has two
+//! hundred.
 
 use scenarios::invariances::{Change, Options, run};
 use std::time::Duration;
 
-/// Rigs that each change is tried on here.
+/// Rigs on which each change is tried here.
 const CASES: u64 = 3;
 
 #[track_caller]

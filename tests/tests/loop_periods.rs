@@ -1,4 +1,4 @@
-//! A law at any loop period: designed, its constants written, and what is no loop's period refused first.
+//! A law at any loop period: designed, its constants written; invalid periods are refused first.
 
 use std::path::Path;
 use std::process::{Command, Output};
@@ -8,7 +8,7 @@ use host_fit::terms::Units;
 use model_core::recursion::LagConvention;
 use scenarios::program;
 
-/// The paper's flow on a rig that is as much slower as the period is longer than 1 ms.
+/// The paper's flow on a rig that is slower by the ratio of the period to 1 ms.
 fn paper_at(period_s: f64) -> Model {
     let path =
         Path::new(env!("CARGO_MANIFEST_DIR")).join("../data/paper/table-2-state-dependent.toml");
@@ -106,7 +106,7 @@ fn what_is_no_loops_period_is_refused_before_anything_else() {
     let out = folder.path().join("c.toml").to_string_lossy().into_owned();
     for period_s in [0.0001, 0.25, 60.0] {
         paper_at(period_s).save(Path::new(&model)).expect("saved");
-        // Neither the target, which cannot be held, nor the rig file, which is not there, is looked at.
+        // The target, which cannot be held, and the rig file, which does not exist, are not checked before.
         let output = run(&[
             "design",
             &model,

@@ -1,4 +1,4 @@
-//! The published coefficients, and what is known of them (steady values, stability, the five-second delay).
+//! The published coefficients and their known properties (steady values, stability, the five-second delay).
 
 use std::path::Path;
 
@@ -67,7 +67,7 @@ fn the_state_dependent_model_rises_as_the_theory_page_says() {
     }
 }
 
-/// Neither reading of the lags is right for all tables.
+/// Neither convention of the lags is right for all tables.
 #[test]
 fn which_reading_is_stable() {
     let minutes = vec![1.0; 240_000];
@@ -88,7 +88,7 @@ fn which_reading_is_stable() {
     assert!(run(&fixed, &minutes[..19_000]).map_or(true, |y| size(&y) > 10.0));
 }
 
-/// c of Table IV by columns; by rows the simulations go negative or diverge.
+/// c of Table IV by columns; by rows the simulations become negative or diverge.
 #[test]
 fn only_the_column_reading_of_c_works() {
     for (name, lowest) in [("table-4-fixed", -0.01), ("table-4-state-dependent", -0.01)] {
@@ -104,7 +104,7 @@ fn only_the_column_reading_of_c_works() {
     }
 }
 
-/// The second input of Table IV only knows that the jets were on five seconds ago.
+/// The second input of Table IV depends only on whether the jets were on five seconds ago.
 #[test]
 fn the_five_second_delay_stands_for_switching_off() {
     let averaged = model("table-4-state-dependent");
@@ -112,7 +112,7 @@ fn the_five_second_delay_stands_for_switching_off() {
         let y = run(&averaged, &on_then_off(on, 2_100)).expect("bounded");
         [y[on + 500], y[on + 1000], y[on + 2000]]
     };
-    // On for 5 s: the flow separates as a flow does.
+    // On for 5 s: the flow separates afterwards, as expected.
     for (found, expected) in after(5_000).into_iter().zip([0.375, 0.158, 0.024]) {
         near(found, expected, 2e-3);
     }

@@ -11,7 +11,7 @@ use host_fit::steps::{compare, discover};
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
-/// What was learned from and what was held out.
+/// The estimation and the validation records.
 fn halves(train: &str, test: &str, period_s: f64) -> (Record, Record) {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data/real");
     let load = |name: &str, role| record(&folder.join(name), role, period_s);
@@ -30,7 +30,7 @@ fn record(path: &Path, role: Use, period_s: f64) -> Record {
     record
 }
 
-/// The same with commands up to 1, as the share of a full jet means nothing in volts.
+/// The same with commands up to 1, because a fraction of a full jet has no meaning in volts.
 fn of_full_commands((mut train, mut test): (Record, Record)) -> (Record, Record) {
     let all = train.u.iter().chain(&test.u);
     let full = all.fold(0.0, |most: f64, u| most.max(u.abs()));
@@ -42,10 +42,10 @@ fn of_full_commands((mut train, mut test): (Record, Record)) -> (Record, Record)
 
 fn held_out(model: &Model, record: &Record) -> f64 {
     let (scores, _) = score(model, std::slice::from_ref(record)).expect("a stable run");
-    scores.validate.expect("a held-out record").rmse
+    scores.validate.expect("a validation record").rmse
 }
 
-/// A linear model as an engineer fits it, with a constant.
+/// A linear model with a constant, as an engineer would fit it.
 fn fitted(linear: &Model, train: &Record) -> Model {
     let options = FitOptions {
         constant: true,
@@ -55,14 +55,14 @@ fn fitted(linear: &Model, train: &Record) -> Model {
     fit.model
 }
 
-/// Silverbox, an electronic Duffing circuit: a linear model, and what it is learned from and judged on.
+/// Silverbox, an electronic Duffing circuit: a linear model, its estimation and its test records.
 fn silverbox() -> (Model, Record, Record) {
     let (mut train, test) = halves(
         "silverbox/silverbox_train_multisine.csv",
         "silverbox/silverbox_test_multisine.csv",
         0.001_638_4,
     );
-    // A quarter is enough, and takes a quarter of the time.
+    // A quarter of the samples suffices and takes a quarter of the time.
     train.u.truncate(16_384);
     train.y.truncate(16_384);
     let linear = Model {
@@ -80,7 +80,7 @@ fn silverbox() -> (Model, Record, Record) {
     (linear, train, test)
 }
 
-/// A linear model leaves 6.95 mV, the best published models 0.3 mV; what is missing is a cubic stiffness.
+/// A linear model leaves 6.95 mV, the best published models 0.3 mV; the missing effect is a cubic stiffness.
 #[test]
 #[ignore = "measured sets, which are not part of the project: cargo xtask kept-rigs"]
 fn silverbox_lacks_a_cubic_stiffness() {
@@ -94,8 +94,8 @@ fn silverbox_lacks_a_cubic_stiffness() {
     assert!(after < 0.0015, "with the cubic term: {after}");
 }
 
-/// A command and a reading in volts: the model with the term that is handed back does on the test record, in the user's
-/// units, what the search for terms says of it.
+/// A command and a reading in volts: on the test record, in the user's units, the returned model with the term has
+/// the error that the search for terms reports.
 #[test]
 #[ignore = "measured sets, which are not part of the project: cargo xtask kept-rigs"]
 fn what_discover_says_of_a_circuit_its_model_does() {
@@ -107,7 +107,11 @@ fn what_discover_says_of_a_circuit_its_model_does() {
     };
     let error = |model: &Model| {
         let compared = compare(model, &set).expect("a stable run");
-        compared.scores.held_out().expect("a held-out record").rmse
+        compared
+            .scores
+            .held_out()
+            .expect("a validation record")
+            .rmse
     };
     let found = discover(&linear, &set, &options, &()).expect("records to learn from");
     let told = found.discovery.ladder.last().expect("a rung").validate_rmse;
@@ -117,7 +121,7 @@ fn what_discover_says_of_a_circuit_its_model_does() {
     assert!(after < 0.8 * before, "{before} with {after}");
 }
 
-/// A linear model of second order, as an engineer would hand it in.
+/// A linear model of second order, as an engineer would fit it.
 fn second_order(period_s: f64, delay: u16, a: [f64; 2], b: f64) -> Model {
     Model {
         sample_period_s: period_s,
@@ -142,8 +146,8 @@ fn diagnosed(model: &Model, records: &[Record], most_effects: usize) -> Diagnosi
     diagnose(model, records, &options, &AtomicBool::new(false), &|_| ()).expect("a diagnosis")
 }
 
-/// A motor that is driven up and coasts down: two time constants are the product
-/// of input and output, which the base class has. It is no missing effect.
+/// A motor that is driven up and coasts down: its two time constants correspond to the product of input and output,
+/// which the base class contains. The product is not a missing effect.
 #[test]
 #[ignore = "measured sets, which are not part of the project: cargo xtask kept-rigs"]
 fn the_motors_two_time_constants_are_in_the_base_class() {
@@ -163,7 +167,7 @@ fn the_motors_two_time_constants_are_in_the_base_class() {
     );
 }
 
-/// A dead time and a lag, which the linear model has: the control set.
+/// A dead time and a lag, which the linear model contains: the control set.
 #[test]
 #[ignore = "measured sets, which are not part of the project: cargo xtask kept-rigs"]
 fn the_hair_dryer_lacks_nothing() {
@@ -205,8 +209,8 @@ fn what_no_effect_explains_is_said_to_be_unexplained() {
     }
 }
 
-/// A Navier–Stokes simulation, learned from a step and two square waves of 4 Hz, judged on one of 8 Hz:
-/// effects that are worth little alone describe most of what the base leaves, and none of them is claimed.
+/// A Navier–Stokes simulation, estimated on a step and two square waves of 4 Hz, validated on one of 8 Hz. Effects
+/// that gain little alone together describe most of the base model's error, and none of them is claimed.
 #[test]
 #[ignore = "a minute of two cores: cargo xtask kept-rigs"]
 fn the_flow_over_a_ramp_is_described_by_stand_ins() {
@@ -233,7 +237,7 @@ fn the_flow_over_a_ramp_is_described_by_stand_ins() {
     let ladder = &found.ladder;
     assert_eq!(found.verdict, Verdict::PartlyExplained, "{ladder:?}");
     assert!(found.missing.is_empty());
-    // The lags alone reach 47 %; so did the search before what promised less was followed.
+    // The lags alone reach 47 %; the search reached no more before it followed less promising candidates.
     let last = ladder.last().expect("a rung");
     assert!(last.validate_fit_percent > 65.0, "{ladder:?}");
 }

@@ -1,4 +1,4 @@
-//! Records as strangers bring them: what is identified, measured, named and printed is right.
+//! Records from other loggers: the identified, measured, named and printed results are right.
 
 use scenarios::strangers::{Options, run, table};
 use std::path::{Path, PathBuf};
@@ -29,7 +29,7 @@ fn bundled_sets_are_answered_right() {
     all_right(&options(Vec::new(), &[]), 12);
 }
 
-/// As good as the best baseline, and printed as written.
+/// As good as the best baseline, and printed as in the written file.
 #[test]
 #[ignore = "measured sets, which are not part of the project: cargo xtask kept-rigs"]
 fn measured_sets_are_no_worse_than_the_baselines() {

@@ -1,5 +1,5 @@
-//! A rig with an effect that no catalogue has: found once the user offers it.
-//! These are the worked examples of `docs/user-effects.md`.
+//! A rig with an effect outside the catalogue: found if the user provides the effect. These are the worked examples
+//! of `docs/user-effects.md`.
 
 use host_fit::data::{Record, Use};
 use host_fit::diagnose::{Diagnosis, Options, Verdict, diagnose};
@@ -13,8 +13,7 @@ const PERIOD: f64 = 0.001;
 const SUBSTEPS: usize = 20;
 const NOISE: f64 = 0.008;
 
-/// The rig as physics, sharing nothing with the tool: jet and reading as
-/// functions of what is going on.
+/// The physics of the rig, without code of the tool: jet and reading as functions of the present signals.
 struct Rig {
     /// Strength of an open jet, `since` seconds after the last edge.
     jet: fn(since: f64) -> f64,
@@ -86,7 +85,7 @@ impl Rig {
     }
 }
 
-/// A rough guess, as an engineer would hand it in.
+/// A rough guess, like a model made by hand.
 const GUESS: &str = r#"
 format_version = 1
 sample_period_s = 0.001
@@ -168,13 +167,12 @@ fn a_ringing_supply_line_is_found_when_it_is_offered() {
         air: |_| 20.0,
         reading: |friction, _| friction,
     };
-    // A fixed delay is whole samples and stays where the base model put it; one
-    // that follows a law is refitted with the effect.
+    // A fixed delay is a whole number of samples and stays at the base model's value; a delay law is refitted with
+    // the effect.
     let law = "law = \"state-dependent\"\ndelay_floor = 40.0\ndelay_rise = 1.0\ndelay_rate = 4.0\nfactors = [1.0]\ninterpolated = true";
     let guess = GUESS.replace("law = \"fixed\"\ndelays = [40]", law);
     let found = diagnosis(&rig, &guess, &[RINGING]);
-    // The gain depends on how the flow takes jets of part strength, which these
-    // records leave open.
+    // The gain depends on the flow's response to jets of part strength, which these records do not identify.
     let truth = [("frequency", 22.0), ("decay_time", 0.08)];
     assert_found(&found, "supply-line-ringing", &truth);
 }

@@ -2,8 +2,7 @@
 
 use heapless::Vec;
 
-/// Content that is being written; what does not fit is cut off, which the
-/// messages' sizes exclude.
+/// Content that is being written; content that does not fit is cut off, which the sizes of the messages exclude.
 pub(crate) struct Writer<const N: usize>(pub(crate) Vec<u8, N>);
 
 impl<const N: usize> Writer<N> {

@@ -1,5 +1,5 @@
-//! Frames: content and CRC-32, byte-stuffed (COBS) so that 0 occurs only
-//! between frames. After any loss the next 0 begins afresh.
+//! Frames: content and CRC-32, byte-stuffed (COBS) so that 0 occurs only between frames. After any loss the next 0
+//! starts a new frame.
 
 use heapless::Vec;
 use model_core::self_test::Crc32;
@@ -9,7 +9,7 @@ pub const CONTENT: usize = 248;
 /// Longest frame on the wire: a zero, content, checksum, two stuffing bytes, a zero.
 pub const WIRE: usize = CONTENT + 4 + 4;
 
-/// Why bytes between two zeros are no frame.
+/// Why the bytes between two zeros are not a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -22,7 +22,7 @@ pub enum Damage {
     Checksum,
 }
 
-/// A frame for the wire, written byte by byte so that no sample pays for a whole one.
+/// A frame for the wire, written byte by byte, so that no sample has to write a whole one.
 ///
 /// ```
 /// use wire::frame::{Frame, Receiver};
@@ -70,7 +70,7 @@ impl Frame {
         frame
     }
 
-    /// Begins afresh. A zero goes first: whatever was cut off before ends there.
+    /// Starts a new frame. A zero is sent first, which ends any truncated frame.
     #[inline(never)]
     pub fn begin(&mut self) {
         *self = Self::empty();
@@ -79,7 +79,7 @@ impl Frame {
         self.push(0);
     }
 
-    /// Adds content; what exceeds [`CONTENT`] bytes is left out.
+    /// Adds content; content beyond [`CONTENT`] bytes is left out.
     #[inline(never)]
     pub fn put(&mut self, content: &[u8]) {
         for byte in content {
@@ -135,11 +135,11 @@ impl Frame {
 #[derive(Clone, Debug)]
 pub struct Receiver {
     content: Vec<u8, { CONTENT + 4 }>,
-    /// Whether `content` was handed out and the next byte begins afresh.
+    /// Whether `content` was returned and the next byte starts a new frame.
     done: bool,
     /// Bytes until the next stuffed zero; 0 before a frame's first byte.
     left: u8,
-    /// Whether a zero belongs where the count ends.
+    /// Whether a zero belongs at the end of the count.
     zero_due: bool,
     damage: Option<Damage>,
 }
@@ -157,8 +157,7 @@ impl Receiver {
         }
     }
 
-    /// Takes a byte. At the end of a frame gives its content, or what is wrong
-    /// with it.
+    /// Receives a byte. At the end of a frame returns its content, or the error.
     pub fn receive(&mut self, byte: u8) -> Option<Result<&[u8], Damage>> {
         if self.done {
             self.done = false;
@@ -306,7 +305,7 @@ mod tests {
     }
 
     proptest! {
-        /// Whatever came before, noise or half a frame: frames after it arrive whole.
+        /// After any noise or partial frame, the following frames arrive complete.
         #[test]
         fn garbage_and_half_frames_harm_nothing_that_follows(
             garbage in prop::collection::vec(any::<u8>(), 0..600),
@@ -321,13 +320,13 @@ mod tests {
             prop_assert_eq!(all.last(), Some(&Ok(content)));
         }
 
-        /// Noise of any kind is no frame; the checksum lets one of 2³² through.
+        /// Noise is not a valid frame; the checksum accepts one of 2³² by coincidence.
         #[test]
         fn garbage_is_no_frame(garbage in prop::collection::vec(any::<u8>(), 0..2000)) {
             prop_assert!(received(&garbage).iter().all(Result::is_err));
         }
 
-        /// A burst of wrong bytes within a frame is noticed.
+        /// A burst of wrong bytes within a frame is detected.
         #[test]
         fn a_burst_is_seen(
             content in prop::collection::vec(any::<u8>(), 1..=CONTENT),

@@ -1,9 +1,8 @@
-//! What host and board say to each other over the serial line.
+//! The protocol of host and board on the serial line.
 //!
-//! Both ends use this crate, so that neither can misread the other. Frames
-//! ([`frame`]) find their beginning again after any loss; [`request`] is what
-//! the host asks, [`reply`] what the board answers, and [`samples`] the stream
-//! that shows every sample. Nothing here allocates, waits or panics.
+//! Both ends use this crate, so their formats cannot differ. Frames ([`frame`]) are found again after any loss.
+//! [`request`] contains the host's requests, [`reply`] the board's answers, and [`samples`] the stream with every
+//! sample. Nothing here allocates, waits or panics.
 //!
 //! # The line is fast enough
 //!
@@ -15,10 +14,9 @@
 //! | readings (disarmed, playing) | 18 + 24 · 3 = 90 | 97 | 4.0 | 35 % |
 //! | with the law (armed) | 22 + 24 · 7 = 190 | 197 | 8.2 | 71 % |
 //!
-//! so that answers and a loop that sends nothing for an eighth of its time still
-//! find room. A board at less than 0.4 ms a sample (0.8 ms with the law) has
-//! more to say than the line takes: what does not fit is left out whole, counted,
-//! and known to the host by its numbers.
+//! so that answers fit too, and a loop that sends nothing for an eighth of its time. A board with less than 0.4 ms
+//! per sample (0.8 ms with the law) produces more than the line transmits. Frames that do not fit are left out
+//! completely and counted, and the host detects them by their numbers.
 #![no_std]
 
 #[cfg(test)]

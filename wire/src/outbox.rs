@@ -1,11 +1,11 @@
-//! What waits to be sent: bounded, and a frame goes in whole or not at all.
+//! The output queue: bounded, and a frame enters completely or not at all.
 
 use heapless::Deque;
 
 /// Bytes of a queue on a board: two frames of the law's samples and an answer.
 pub const ROOM: usize = 640;
 
-/// Bytes on their way to the line. Nothing here waits.
+/// Bytes waiting for the line. No call waits.
 #[derive(Clone, Debug, Default)]
 pub struct Outbox {
     bytes: Deque<u8, ROOM>,
@@ -20,7 +20,7 @@ impl Outbox {
         }
     }
 
-    /// Takes all of `bytes`, or, where there is no room for them, none.
+    /// Adds all of `bytes`, or none if they do not fit.
     pub fn offer(&mut self, bytes: &[u8]) -> bool {
         if bytes.len() > ROOM - self.bytes.len() {
             return false;

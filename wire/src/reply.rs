@@ -3,13 +3,12 @@
 use crate::bytes::{Reader, Writer};
 use crate::frame::{CONTENT, Frame};
 
-/// The version of this dialogue; host and board must have the same.
+/// The version of this protocol; host and board must have the same.
 pub const PROTOCOL: u8 = 2;
-/// A host that has not been heard for so long is lost, ms. What it had the board
-/// play ends then.
+/// A host without a message for this time counts as lost, ms. The command that it plays then ends.
 pub const LOST_AFTER_MS: u32 = 500;
 
-/// The same in samples of `period_us`, and no fewer than ten: the board hears its host once a sample at most.
+/// The same in samples of `period_us`, at least ten, because the board receives at most one message per sample.
 ///
 /// ```
 /// use wire::reply::lost_after_samples;
@@ -32,17 +31,17 @@ pub enum Status {
     Done = 0,
     /// Another host has the board.
     Busy = 1,
-    /// More runs than the board keeps; the detail says how many it keeps.
+    /// More runs than the board can store; the detail is that number.
     TooLong = 2,
-    /// Runs are missing before these; the detail says how many the board has.
+    /// Runs are missing before these; the detail is the number of stored runs.
     Missing = 3,
-    /// A run is shorter than the valve's hold time; the detail says which.
+    /// A run is shorter than the valve's hold time; the detail is its index.
     TooShort = 4,
-    /// What is loaded is not what is to be played.
+    /// The loaded command is not the one to be played.
     OtherCommand = 5,
     /// Nothing to play: no runs, no repeats, or more samples than can be counted.
     Nothing = 6,
-    /// A fault is latched, or the law or a command has the valve: disarm first.
+    /// A fault is latched, or the law or a command controls the valve: disarm first.
     NotDisarmed = 7,
     /// A setting outside its bounds: the valve is shut and the fault latched.
     Outside = 8,
@@ -115,7 +114,7 @@ impl Phase {
     }
 }
 
-/// A sensor's or a channel's line: value = (counts − zero) · per_count.
+/// The scale of a sensor or channel: value = (counts − zero) · per_count.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Scale {
     /// Counts of 0.
@@ -124,7 +123,7 @@ pub struct Scale {
     pub per_count: f32,
 }
 
-/// Who the board is and how things are.
+/// Identity and state of the board.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Info {
     /// [`PROTOCOL`] of the board.
@@ -147,7 +146,7 @@ pub struct Info {
     pub envelope: f32,
     /// Shortest times open and shut, samples.
     pub hold: [u32; 2],
-    /// From counts to the channel's unit; all zero where the model needs none.
+    /// From counts to the channel's unit; all zero if the model needs none.
     pub channel: Scale,
     /// What the board does.
     pub phase: Phase,
@@ -157,8 +156,7 @@ pub struct Info {
     pub most_runs: u16,
     /// Damaged frames received since the start, wrapping.
     pub damaged: u32,
-    /// The host that has the board; 0 if none has. A board that was restarted has
-    /// forgotten its host.
+    /// The host that controls the board; 0 if none does. A restarted board has no host.
     pub session: u32,
 }
 
@@ -220,7 +218,7 @@ pub enum Answer {
         status: Status,
         /// What the status says more.
         detail: u32,
-        /// Samples since the board's start when it was carried out.
+        /// Samples from the board's start to the execution.
         samples: u64,
     },
 }
@@ -299,7 +297,7 @@ impl Reply {
         Frame::new(&content.0)
     }
 
-    /// From a frame's content; `None` if it is no answer.
+    /// From a frame's content; `None` if it is not an answer.
     #[must_use]
     pub fn read(content: &[u8]) -> Option<Self> {
         let mut reader = Reader(content);

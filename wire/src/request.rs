@@ -1,13 +1,11 @@
-//! What the host asks of the board.
+//! The host's requests to the board.
 //!
-//! Every request carries a number and the session, a number that the host draws
-//! when it connects. The board serves one session at a time: another host is
-//! told [`Status::Busy`](crate::reply::Status::Busy) until the first has been
-//! silent for the link's time. Asking who is there and shutting the valves is
-//! allowed to everyone.
+//! Every request carries a number and the session, a random number of the host's connection. The board serves one
+//! session at a time: another host gets the answer [`Status::Busy`](crate::reply::Status::Busy) until the first has
+//! been silent for the link's timeout. Every host may request the identity and close the valves.
 //!
-//! A request whose answer was lost is sent again with its number; the board
-//! then gives the same answer and does not carry it out twice.
+//! A request whose answer was lost is sent again with the same number; the board then gives the same answer and
+//! does not execute it twice.
 
 use crate::bytes::{Reader, Writer};
 use crate::frame::{CONTENT, Frame};
@@ -18,12 +16,12 @@ pub const RUNS: usize = 56;
 /// What is asked.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Ask<'a> {
-    /// Who are you, how are things? Answered with [`Info`](crate::reply::Info).
+    /// Requests identity and state. Answered with [`Info`](crate::reply::Info).
     Hello,
-    /// The host is there; no answer. A board that has not heard its host for
-    /// [`LOST_AFTER_MS`](crate::reply::LOST_AFTER_MS) shuts the valves.
+    /// Keep-alive message; no answer. A board without a message from its host for
+    /// [`LOST_AFTER_MS`](crate::reply::LOST_AFTER_MS) closes the valves.
     Alive,
-    /// Run lengths of a command, to be kept from index `at` on.
+    /// Run lengths of a command, to be stored from index `at` on.
     Load {
         /// Index of the first of them; 0 begins a new command.
         at: u16,
@@ -36,14 +34,14 @@ pub enum Ask<'a> {
         repeats: u32,
         /// Its number of runs.
         runs: u16,
-        /// [`checksum`] of its runs: what is played is what was meant.
+        /// [`checksum`] of its runs, so that the played command is the intended one.
         checksum: u32,
     },
     /// Stream every sample from now on, whatever the valve does.
     Stream,
     /// Let the law drive the valve; also ends a pause.
     Arm,
-    /// Shut the valve, end what is played, take note of a fault.
+    /// Close the valve, end the command being played, acknowledge a fault.
     Disarm,
     /// The settings of the law with their bounds? Answered with [`Settings`](crate::reply::Settings).
     Settings,
@@ -66,7 +64,7 @@ pub struct Request<'a> {
     pub ask: Ask<'a>,
 }
 
-/// Run lengths as they lie in a request.
+/// Run lengths as stored in a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Runs<'a>(&'a [u8]);
 
@@ -102,7 +100,7 @@ const AIR: u8 = 0x29;
 const PAUSE: u8 = 0x2A;
 
 impl<'a> Request<'a> {
-    /// From a frame's content; `None` if it is no request.
+    /// From a frame's content; `None` if it is not a request.
     #[must_use]
     pub fn read(content: &'a [u8]) -> Option<Self> {
         let mut reader = Reader(content);
@@ -246,7 +244,7 @@ mod tests {
             };
             let bytes = content(&request.frame());
             assert_eq!(Request::read(&bytes), Some(request));
-            // A request with something after it is another one.
+            // Content after the end of a request makes it invalid.
             assert_eq!(Request::read(&[&bytes[..], &[0]].concat()), None);
         }
     }

@@ -1,9 +1,8 @@
-//! The stream: every sample of the loop, numbered, a batch in a frame.
+//! The stream: every sample of the loop, numbered, a batch per frame.
 //!
-//! Sensor and channel are sent as the converter's 12 bits, so that nothing is
-//! rounded on the way. What the law adds is sent as counts of the sensor, too,
-//! in eighths: half a count is far below any sensor's noise, and the scale fits
-//! whatever unit y has.
+//! Sensor and channel are sent as the converter's 12 bits, so nothing is rounded. The law's signals are also sent
+//! as counts of the sensor, in eighths: half a count is far below any sensor's noise, and the scale is suitable for
+//! any unit of y.
 
 use crate::bytes::Reader;
 use crate::frame::Frame;
@@ -11,9 +10,9 @@ use crate::reply::Phase;
 
 /// Most samples in a frame.
 pub const BATCH: usize = 24;
-/// Steps of a count in which the law's numbers are sent.
+/// Fraction of a count in which the law's signals are sent.
 pub const STEPS: f32 = 8.0;
-/// Largest count of a 12-bit converter; what is no number is sent as this.
+/// Largest count of a 12-bit converter; NaN is sent as this.
 pub const FULL: u16 = 0xFFF;
 
 const READINGS: u8 = 0x40;
@@ -21,7 +20,7 @@ const LAW: u8 = 0x41;
 /// Kind, session, first number, phase, last, left out.
 const HEAD: usize = 1 + 4 + 4 + 1 + 1 + 4;
 
-/// A sample as it is streamed.
+/// A streamed sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sample {
     /// Counts of the sensor.
@@ -30,17 +29,17 @@ pub struct Sample {
     pub channel: u16,
     /// The valve from this sample to the next.
     pub open: bool,
-    /// While the law runs: what the model said the sensor would show, and how
-    /// far the reading was from it, counts of the sensor.
+    /// While the law runs: the model's predicted reading, and the deviation of the reading from it, counts of the
+    /// sensor.
     pub law: Option<Law>,
 }
 
-/// What the law adds to a sample, counts of the sensor.
+/// The law's signals in a sample, counts of the sensor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Law {
-    /// What the model said the sensor would show.
+    /// The model's predicted reading.
     pub model: f32,
-    /// Reading (averaged where the model is) minus that; a difference, without zero.
+    /// Reading (averaged if the model is) minus the prediction; a difference, without zero.
     pub residual: f32,
 }
 
@@ -56,7 +55,7 @@ pub struct Batch {
     count: usize,
     /// A bit for each sample.
     open: u32,
-    /// Samples that found no room since the session began, wrapping.
+    /// Samples that did not fit since the session began, wrapping.
     left_out: u32,
 }
 
@@ -88,15 +87,13 @@ impl Batch {
         self.next
     }
 
-    /// Whether another sample finds room: the batch is not full, and those in it
-    /// were of the same phase.
+    /// Whether another sample fits: the batch is not full, and its samples have the same phase.
     #[must_use]
     pub fn takes(&self, sample: &Sample, phase: Phase) -> bool {
         self.count == 0 || (self.count < BATCH && self.phase == phase && self.kind == kind(sample))
     }
 
-    /// Adds a sample. A batch that does not take it ([`Self::takes`]) must have
-    /// been ended.
+    /// Adds a sample. A batch that cannot take it ([`Self::takes`]) must have been ended before.
     #[inline(never)]
     pub fn push(&mut self, sample: &Sample, phase: Phase, reference: f32) {
         if self.count == 0 {
@@ -132,15 +129,14 @@ impl Batch {
         self.count
     }
 
-    /// Whether there is something to send and no room for more.
+    /// Whether there is something to send and no further sample fits.
     #[must_use]
     pub fn is_full(&self) -> bool {
         self.count >= BATCH
     }
 
-    /// Ends the batch and hands its frame to `send`, which says whether it found
-    /// room; if it found none, its samples count as left out. `last` says that
-    /// the stream ends here, and is sent also without a sample.
+    /// Ends the batch and passes its frame to `send`, which returns whether it fits in the queue. If it does not,
+    /// its samples count as left out. `last` marks the end of the stream and is sent even without a sample.
     pub fn end(&mut self, last: bool, send: impl FnOnce(&[u8]) -> bool) {
         if self.count == 0 {
             if !last {
@@ -163,7 +159,7 @@ impl Batch {
         self.count = 0;
     }
 
-    /// The phase that is told at an end without samples.
+    /// The phase that is sent at an end without samples.
     pub fn note(&mut self, phase: Phase) {
         if self.count == 0 {
             self.phase = phase;
@@ -199,7 +195,7 @@ pub struct Samples<'a> {
     pub reference: Option<f32>,
     /// Whether the stream ends with it.
     pub last: bool,
-    /// Samples before it that found no room on the board, wrapping.
+    /// Samples before it that did not fit on the board, wrapping.
     pub left_out: u32,
     open: u32,
     law: bool,
@@ -207,7 +203,7 @@ pub struct Samples<'a> {
 }
 
 impl<'a> Samples<'a> {
-    /// From a frame's content; `None` if it is no stream.
+    /// From a frame's content; `None` if it is not a stream.
     #[must_use]
     pub fn read(content: &'a [u8]) -> Option<Self> {
         let mut reader = Reader(content);
@@ -309,7 +305,7 @@ mod tests {
     }
 
     proptest! {
-        /// What is not left out arrives with its number; what is left out is counted.
+        /// Samples that are not left out arrive with their numbers; the others are counted.
         #[test]
         fn samples_arrive_or_are_counted(all in prop::collection::vec(sample(), 0..200)) {
             let mut batch = Batch::new();

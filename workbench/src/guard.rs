@@ -1,8 +1,8 @@
-//! Who may ask: this machine, this run's page, and nobody through it.
+//! Access control: only this machine and the page of this run, and no other page through it.
 //!
-//! A browser runs pages of strangers, and they can reach loopback. Three things keep them out: the token of this run, which is in the
-//! address that was opened and nowhere else; the `Host`, which a name that was rebound to 127.0.0.1 cannot fake; and the `Origin`
-//! and `Sec-Fetch-Site`, which a page of another site cannot leave out where it changes something.
+//! A browser also runs pages of other sites, and these can reach loopback. Three checks exclude them. The token of
+//! this run is only in the opened address. The `Host` header cannot be forged by a name that was rebound to
+//! 127.0.0.1. A page of another site cannot omit `Origin` and `Sec-Fetch-Site` in a request that changes something.
 
 use axum::extract::{Request, State};
 use axum::http::header::{
@@ -21,7 +21,7 @@ pub(crate) struct Guard {
 }
 
 impl Guard {
-    /// A guard with a token of its own; fails where the system has no random numbers to give.
+    /// A guard with its own token; fails if the system provides no random numbers.
     pub(crate) fn new(port: u16) -> std::io::Result<Self> {
         let mut bytes = [0u8; 24];
         getrandom::fill(&mut bytes).map_err(std::io::Error::other)?;
@@ -46,20 +46,20 @@ impl Guard {
         // One `Host`, and ours.
         let single = headers.get_all(HOST).iter().count() == 1;
         if !(single && text(&HOST).is_some_and(|host| self.own(host))) {
-            return Err("this address is not the workbench's; open the one that it printed");
+            return Err("this address does not belong to the workbench; open the printed one");
         }
         if let Some(origin) = text(&ORIGIN)
             && !origin.strip_prefix("http://").is_some_and(|o| self.own(o))
         {
-            return Err("a page of another site may not ask the workbench");
+            return Err("a page of another site must not send requests to the workbench");
         }
         let site = headers.get("sec-fetch-site").map(HeaderValue::as_bytes);
         if !matches!(site, None | Some(b"same-origin" | b"none")) {
-            return Err("a page of another site may not ask the workbench");
+            return Err("a page of another site must not send requests to the workbench");
         }
         let given = match headers.get("x-token") {
             Some(token) => Some(token.as_bytes()),
-            // Only what changes nothing may carry it in the address: links to files, the page itself.
+            // Only requests that change nothing may carry it in the address: links to files, the page itself.
             None if request.method() == Method::GET => {
                 let pairs = request.uri().query().unwrap_or("").split('&');
                 let mut found = pairs.filter_map(|pair| pair.strip_prefix("token="));
@@ -76,7 +76,7 @@ impl Guard {
     }
 }
 
-/// Equal, in a time that does not tell how far.
+/// Comparison in a time that does not depend on the position of the first difference.
 fn same(a: &[u8], b: &[u8]) -> bool {
     a.len() == b.len() && a.iter().zip(b).fold(0, |all, (a, b)| all | (a ^ b)) == 0
 }

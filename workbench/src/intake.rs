@@ -1,4 +1,4 @@
-//! What comes in is bounded in size and time before anything is kept of it.
+//! Limits of size and time for incoming requests, applied before anything is stored.
 
 use std::net::TcpListener;
 use std::sync::Arc;
@@ -26,13 +26,13 @@ pub(crate) const UPLOAD: &str = "/api/upload/";
 
 /// Connections at a time: a browser opens six, and events hold one for each page.
 const CONNECTIONS: usize = 64;
-/// How long the head of a request may take; the browser is on the same machine.
+/// Longest time for the head of a request; the browser is on the same machine.
 const HEAD: Duration = Duration::from_millis(if cfg!(test) { 200 } else { 10_000 });
-/// How long a request may take, and a file.
+/// Longest time for a request, and for a file.
 const BODY: Duration = Duration::from_secs(10);
 const FILE: Duration = Duration::from_secs(120);
 
-/// Files are uploaded one at a time: each is held in memory until it is kept.
+/// Files are uploaded one at a time, because each is held in memory until it is stored.
 #[derive(Clone, Debug)]
 pub(crate) struct Uploads(Arc<Semaphore>);
 
@@ -42,7 +42,8 @@ impl Uploads {
     }
 }
 
-/// Takes a request's content in, or refuses it: by its stated length before a byte is read, by what has come otherwise.
+/// Reads a request's content or refuses it: by its stated length before a byte is read, otherwise by the received
+/// length.
 pub(crate) async fn take_in(
     State(uploads): State<Uploads>,
     request: Request,
@@ -72,14 +73,14 @@ pub(crate) async fn take_in(
         Ok(Err(_)) => refused(StatusCode::PAYLOAD_TOO_LARGE, &too_large(largest)),
         Err(_) => refused(
             StatusCode::REQUEST_TIMEOUT,
-            "the request did not come to its end; send it again",
+            "the request was incomplete; send it again",
         ),
     }
 }
 
 fn too_large(largest: usize) -> String {
     format!(
-        "more than {} kB, or cut short; import larger files with `host-fit import`",
+        "more than {} kB, or incomplete; import larger files with `host-fit import`",
         largest >> 10
     )
 }
@@ -88,7 +89,7 @@ fn refused(status: StatusCode, why: &str) -> Response {
     (status, axum::Json(json!({"error": why}))).into_response()
 }
 
-/// Serves until the process ends. A connection whose request does not come is closed.
+/// Serves until the process ends. A connection without a complete request is closed.
 pub(crate) async fn serve(listener: TcpListener, router: Router) -> std::io::Result<()> {
     let listener = tokio::net::TcpListener::from_std(listener)?;
     let places = Arc::new(Semaphore::new(CONNECTIONS));
@@ -96,7 +97,7 @@ pub(crate) async fn serve(listener: TcpListener, router: Router) -> std::io::Res
         let place = places.clone().acquire_owned().await;
         let (stream, _) = match listener.accept().await {
             Ok(accepted) => accepted,
-            // Out of file descriptors: some come back.
+            // Out of file descriptors: some become free again.
             Err(_) => {
                 tokio::time::sleep(Duration::from_millis(50)).await;
                 continue;
@@ -106,7 +107,7 @@ pub(crate) async fn serve(listener: TcpListener, router: Router) -> std::io::Res
         tokio::spawn(async move {
             let mut http = hyper::server::conn::http1::Builder::new();
             http.timer(TokioTimer::new()).header_read_timeout(HEAD);
-            // A page that is closed in between is no fault.
+            // A page that is closed meanwhile is not an error.
             let _ = http.serve_connection(TokioIo::new(stream), service).await;
             drop(place);
         });
@@ -120,7 +121,7 @@ mod tests {
     use std::net::{Ipv4Addr, TcpStream};
     use std::time::Instant;
 
-    /// A head that does not come to its end holds no place for long, and others are answered meanwhile.
+    /// An incomplete head occupies a connection only for a short time, and other requests are answered meanwhile.
     #[test]
     fn a_request_that_does_not_come_is_closed() {
         let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();

@@ -1,8 +1,8 @@
-//! The workbench's server: a page over a project folder, for one person at one machine.
+//! The workbench's server: a page for a project folder, for one person on one machine.
 //!
-//! It knows nothing of models. What can be done is a [`Bench`]; this crate brings requests to it safely ([`guard`](self)), runs one
-//! piece of work at a time with its progress told to every page that is open ([`Work`]), and keeps the tree of what was made and
-//! the log of how on disk ([`Project`]).
+//! It does not depend on models. The available actions are a [`Bench`]. This crate passes requests to it safely
+//! ([`guard`](self)), runs one task at a time and sends its progress to every open page ([`Work`]), and stores the
+//! tree of models and the log of commands ([`Project`]).
 
 mod guard;
 mod intake;

@@ -1,7 +1,8 @@
-//! The project folder: models as files, the tree of how they came about, and the log of commands.
+//! The project folder: models as files, the tree of their origins, and the log of commands.
 //!
-//! `tree.json` is written whole after every step, by a rename; a server that is killed leaves the last whole state. The models are the
-//! files that the command line reads and writes. A second workbench on the folder is refused by a lock.
+//! `tree.json` is written completely after every step, by a rename; a server that is killed leaves the last
+//! complete state. The models are the files that the command line reads and writes. A lock refuses a second
+//! workbench on the same folder.
 
 use std::fs::{self, File};
 use std::io::{self, Write};
@@ -15,26 +16,26 @@ use serde::{Deserialize, Serialize};
 pub struct Node {
     /// Number of the model, from 1.
     pub id: u32,
-    /// The model that it was made from; none for one that was identified or brought along.
+    /// The model from which it was made; `None` for one that was identified or added by the user.
     pub parent: Option<u32>,
-    /// What was done, in a few words: `identified`, `+ plenum-droop`.
+    /// The step in a few words: `identified`, `+ plenum-droop`.
     pub step: String,
     /// The same as a command.
     pub command: String,
     /// The model's file, within the folder.
     pub file: String,
-    /// Root mean square error on the held-out records, y; none where its free run diverges.
+    /// Root mean square error on the validation records, y; `None` if the free run diverges.
     pub rmse: Option<f64>,
-    /// The noise floor there, y.
+    /// The noise level there, y.
     pub noise_rmse: Option<f64>,
-    /// FIT on the held-out records, %.
+    /// FIT on the validation records, %.
     pub fit_percent: Option<f64>,
 }
 
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 struct Tree {
     format_version: u32,
-    /// Hash of the data set that the models were made from.
+    /// Hash of the data set from which the models were made.
     data: String,
     current: Option<u32>,
     nodes: Vec<Node>,
@@ -49,7 +50,7 @@ const LOG: &str = "log.txt";
 #[non_exhaustive]
 pub enum ProjectError {
     /// The operating system refused.
-    #[error("{path}: {cause}; check that the folder may be written to and has space", path = .path.display())]
+    #[error("{path}: {cause}; check that the folder is writable and has space", path = .path.display())]
     Io {
         /// The file or folder.
         path: PathBuf,
@@ -60,13 +61,13 @@ pub enum ProjectError {
     #[error(transparent)]
     Output(#[from] OutputError),
     /// A link, which may lead out of the folder.
-    #[error("{path} is a link, and a project has none: put the file itself in its place", path = .0.display())]
+    #[error("{path} is a link, which is not allowed in a project: put the file itself in its place", path = .0.display())]
     Link(PathBuf),
     /// Another workbench is open on it.
     #[error("{path} is open in another workbench; use that one, or close it", path = .0.display())]
     Locked(PathBuf),
     /// A tree that is none.
-    #[error("{path} is no tree of this version ({cause}); name another folder with --project", path = .path.display())]
+    #[error("{path} is not a tree of this version ({cause}); name another folder with --project", path = .path.display())]
     Tree {
         /// The file.
         path: PathBuf,
@@ -74,14 +75,14 @@ pub enum ProjectError {
         cause: String,
     },
     /// Models of other data.
-    #[error("{path} holds models of another data set; name another folder with --project", path = .0.display())]
+    #[error("{path} contains models of another data set; name another folder with --project", path = .0.display())]
     OtherData(PathBuf),
     /// A model that is not in the tree.
     #[error("there is no model {0}")]
     NoNode(u32),
 }
 
-/// The path of `relative` within `folder`, if no step of it is a link: nothing is read or written elsewhere.
+/// The path of `relative` within `folder`, if none of its parts is a link: nothing outside is read or written.
 ///
 /// # Errors
 /// [`ProjectError::Link`] naming the link.
@@ -101,15 +102,15 @@ pub fn beneath(folder: &Path, relative: &Path) -> Result<PathBuf, ProjectError> 
 pub struct Project {
     folder: PathBuf,
     tree: Tree,
-    /// Held as long as the project is open; the system lets go of it when the process ends, however it ends.
+    /// Held as long as the project is open; the system releases it when the process ends in any way.
     _lock: File,
 }
 
 impl Project {
-    /// Opens the folder for the data set with this hash, or for whichever it has; makes it where there is none.
+    /// Opens the folder for the data set with this hash, or for its own data set; creates it if it does not exist.
     ///
     /// # Errors
-    /// [`ProjectError`] naming the file, and what to do.
+    /// [`ProjectError`] naming the file, and the remedy.
     pub fn open(folder: &Path, data: Option<&str>) -> Result<Self, ProjectError> {
         let io = |path: &Path| {
             let path = path.to_path_buf();
@@ -159,10 +160,10 @@ impl Project {
         Ok(project)
     }
 
-    /// Says of which data set the models are.
+    /// Sets the data set of the models.
     ///
     /// # Errors
-    /// [`ProjectError::OtherData`] where there are models of another one.
+    /// [`ProjectError::OtherData`] if there are models of another one.
     pub fn set_data(&mut self, data: &str) -> Result<(), ProjectError> {
         if !self.tree.nodes.is_empty() && self.tree.data != data {
             return Err(ProjectError::OtherData(self.folder.clone()));
@@ -177,7 +178,7 @@ impl Project {
         &self.folder
     }
 
-    /// Every model, in the order in which they were made.
+    /// Every model, in the order of creation.
     #[must_use]
     pub fn nodes(&self) -> &[Node] {
         &self.tree.nodes
@@ -217,10 +218,11 @@ impl Project {
         highest.unwrap_or(0).saturating_add(1)
     }
 
-    /// Adds a model whose file is in the folder already, makes it the current one and notes its command. Its number is given here.
+    /// Adds a model whose file is in the folder already, makes it the current one and logs its command. Its number
+    /// is assigned here.
     ///
     /// # Errors
-    /// [`ProjectError`] when the folder cannot be written; the tree is then as before.
+    /// [`ProjectError`] if the folder cannot be written; the tree is then unchanged.
     pub fn add(&mut self, node: Node) -> Result<u32, ProjectError> {
         let id = self.next_id();
         self.note(&node.command)?;
@@ -231,10 +233,10 @@ impl Project {
         Ok(id)
     }
 
-    /// Makes another model the current one: undo, redo and branches are this.
+    /// Makes another model the current one; undo, redo and branches use this.
     ///
     /// # Errors
-    /// [`ProjectError`] when there is no such model or the folder cannot be written.
+    /// [`ProjectError`] if there is no such model or the folder cannot be written.
     pub fn select(&mut self, id: u32) -> Result<(), ProjectError> {
         self.node(id)?;
         let tree = Tree {
@@ -259,7 +261,7 @@ impl Project {
     /// Notes a command in the log.
     ///
     /// # Errors
-    /// [`ProjectError`] when the log cannot be written.
+    /// [`ProjectError`] if the log cannot be written.
     pub fn note(&self, command: &str) -> Result<(), ProjectError> {
         let path = beneath(&self.folder, Path::new(LOG))?;
         let line = format!("{}\n", command.replace(['\n', '\r'], " "));
@@ -292,7 +294,7 @@ fn check(tree: &Tree) -> Result<(), String> {
             return Err(format!("model {} twice", node.id));
         }
         if node.parent.is_some_and(|p| earlier().all(|n| n.id != p)) {
-            return Err(format!("model {} before its parent", node.id));
+            return Err(format!("model {} comes before its parent", node.id));
         }
         let mut parts = Path::new(&node.file).components();
         let plain = matches!(parts.next(), Some(std::path::Component::Normal(_)));

@@ -21,7 +21,7 @@ use crate::guard::{Guard, guard};
 use crate::intake;
 use crate::work::Work;
 
-/// Why something was not done: one paragraph with the remedy.
+/// Why a request failed: one paragraph with the remedy.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Refusal(pub String);
 
@@ -52,13 +52,14 @@ pub struct Download {
     pub content: Vec<u8>,
 }
 
-/// What can be done at the bench. Every method may be called from several threads; [`Bench::run`] from one at a time.
+/// The actions of the workbench. Every method may be called from several threads; [`Bench::run`] from one at a
+/// time.
 pub trait Bench: Send + Sync + 'static {
     /// The page.
     fn page(&self) -> String;
-    /// Everything but the curves, as a JSON document.
+    /// The state without the curves, as a JSON document.
     fn state(&self) -> Value;
-    /// Records with the free runs of some models, as the page's script draws them.
+    /// Records with the free runs of some models, in the form that the page's script draws.
     ///
     /// # Errors
     /// [`Refusal`] in words for the user.
@@ -68,17 +69,17 @@ pub trait Bench: Send + Sync + 'static {
     /// # Errors
     /// [`Refusal`] in words for the user.
     fn select(&self, model: u32) -> Result<(), Refusal>;
-    /// Other questions, and changes, that are quick: a JSON document for a JSON document.
+    /// Other quick queries and changes: a JSON document for a JSON document.
     ///
     /// # Errors
     /// [`Refusal`] in words for the user.
     fn ask(&self, question: &Value) -> Result<Value, Refusal>;
-    /// Keeps a file of the user's, and tells what is in it. `name` is whatever the page says.
+    /// Stores a user's file and returns its contents. `name` is chosen by the page.
     ///
     /// # Errors
     /// [`Refusal`] in words for the user.
     fn upload(&self, name: &str, content: &[u8]) -> Result<Value, Refusal>;
-    /// Whether this is work at all, before it is begun: its name.
+    /// The name of the task, if the request is valid; checked before it starts.
     ///
     /// # Errors
     /// [`Refusal`] in words for the user.
@@ -102,7 +103,8 @@ struct Shared<B> {
 
 type At<B> = State<Arc<Shared<B>>>;
 
-/// Serves `bench` on loopback until the process ends; `port` 0 is any free one. `ready` hears the address, with this run's token.
+/// Serves `bench` on loopback until the process ends; `port` 0 is any free one. `ready` receives the address, with
+/// this run's token.
 ///
 /// # Errors
 /// When the port cannot be had.
@@ -142,18 +144,18 @@ fn router<B: Bench>(bench: B, rules: Guard) -> Router {
             intake::Uploads::new(),
             intake::take_in,
         ))
-        // Asked first: of a stranger's request nothing is read.
+        // Checked first: nothing is read of a foreign request.
         .layer(middleware::from_fn_with_state(rules, guard))
 }
 
-/// Runs what may take a while without holding up the other requests.
+/// Runs a longer action without blocking other requests.
 async fn aside<T: Send + 'static>(
     work: impl FnOnce() -> Result<T, Refusal> + Send + 'static,
 ) -> Result<T, Refused> {
     match tokio::task::spawn_blocking(work).await {
         Ok(Ok(value)) => Ok(value),
         Ok(Err(why)) => Err(refused(StatusCode::UNPROCESSABLE_ENTITY, &why.0)),
-        // A panic in the library: a fault of ours, but the server goes on.
+        // A panic in the library is a fault of the tool, but the server continues.
         Err(_) => Err(refused(
             StatusCode::INTERNAL_SERVER_ERROR,
             "this failed inside the program; please report it with the log of the project",
@@ -161,7 +163,7 @@ async fn aside<T: Send + 'static>(
     }
 }
 
-/// Why a request was not answered, as the page hears it.
+/// Why a request was not answered, in the form sent to the page.
 struct Refused(StatusCode, String);
 
 impl IntoResponse for Refused {
@@ -259,10 +261,10 @@ async fn run<B: Bench>(State(shared): At<B>, body: Bytes) -> Result<Response, Re
         .name(&request)
         .map_err(|why| refused(StatusCode::BAD_REQUEST, &why.0))?;
     if !shared.work.begin(&name) {
-        let why = "something is running already; wait for it, or cancel it";
+        let why = "a task is running already; wait for it, or cancel it";
         return Err(refused(StatusCode::CONFLICT, why));
     }
-    // Not awaited: the page hears of its end as of everything else.
+    // Not awaited: the page is informed of its end by an event.
     tokio::task::spawn_blocking(move || {
         let work = shared.work.clone();
         let done = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
@@ -310,7 +312,7 @@ async fn events<B: Bench>(State(shared): At<B>) -> Response {
     let told = stream::unfold(shared.work.listen(), |mut events| async move {
         let text = match events.recv().await {
             Ok(text) => text,
-            // A page that slept asks for everything anew.
+            // A page that missed events requests the whole state.
             Err(RecvError::Lagged(_)) => json!({"kind": "changed"}).to_string(),
             Err(RecvError::Closed) => return None,
         };

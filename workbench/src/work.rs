@@ -1,4 +1,4 @@
-//! One piece of work at a time, told to every page that is open.
+//! One task at a time, reported to every open page.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use serde_json::{Value, json};
 use tokio::sync::broadcast;
 
-/// A piece of work while it runs: it tells how far it is, and hears when it is to end.
+/// A running task: it reports its progress and is informed when it should end.
 #[derive(Debug, Clone)]
 pub struct Work {
     shared: Arc<Shared>,
@@ -23,18 +23,18 @@ struct Shared {
 struct Running {
     name: String,
     now: String,
-    /// The best so far over the evaluations of the search that runs.
+    /// Best value of the running search so far, over its evaluations.
     best: Vec<(usize, f64)>,
 }
 
 impl Running {
-    /// Notes the best of a search; fewer evaluations than before are another search's.
+    /// Stores the best value of a search; fewer evaluations than before belong to another search.
     fn note(&mut self, evaluations: usize, best: f64) {
         const KEPT: usize = 1000;
         if self.best.last().is_some_and(|last| evaluations < last.0) {
             self.best.clear();
         }
-        // Of a level stretch its two ends are enough.
+        // Of an interval with a constant value only the two ends are stored.
         if let [.., before, last] = self.best.as_slice()
             && before.1 == best
             && last.1 == best
@@ -53,7 +53,7 @@ impl Running {
 }
 
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    // What is kept is replaced whole: a panic elsewhere leaves nothing half-done in it.
+    // Stored values are replaced as a whole, so a panic elsewhere leaves none half-changed.
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
@@ -69,13 +69,13 @@ impl Work {
         }
     }
 
-    /// Raised when the user wants the best so far at once.
+    /// Set when the user requests the best result so far.
     #[must_use]
     pub fn cancel(&self) -> &AtomicBool {
         &self.shared.cancel
     }
 
-    /// What the work is at now, in words.
+    /// The present activity of the task, in words.
     pub fn now(&self, words: &str) {
         if let Some(running) = lock(&self.shared.running).as_mut() {
             words.clone_into(&mut running.now);
@@ -83,7 +83,7 @@ impl Work {
         self.tell(&json!({"kind": "now", "words": words}));
     }
 
-    /// The best that a search has after so many evaluations.
+    /// The best value of a search after this many evaluations.
     pub fn best(&self, evaluations: usize, best: f64) {
         if !best.is_finite() {
             return;
@@ -108,7 +108,7 @@ impl Work {
         self.shared.events.subscribe()
     }
 
-    /// What is running, for a page that has just been opened.
+    /// The running task, for a page that was just opened.
     pub(crate) fn state(&self) -> Value {
         match lock(&self.shared.running).as_ref() {
             None => Value::Null,
@@ -116,7 +116,7 @@ impl Work {
         }
     }
 
-    /// Takes the bench for a piece of work; none while another one runs.
+    /// Reserves the bench for a task; `None` while another one runs.
     pub(crate) fn begin(&self, name: &str) -> bool {
         let mut running = lock(&self.shared.running);
         if running.is_some() {

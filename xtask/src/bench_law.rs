@@ -5,6 +5,7 @@ use crate::shell::{run, scenario};
 
 pub(crate) const TASK: Task = Task {
     name: "bench-law",
-    does: "the designed law against relay, PI, Smith predictor and open loop: one table; --beyond: only the plants with physics that its model lacks",
+    does: "compares the designed law with relay, PI, Smith predictor and open loop; --beyond: only the plants \
+         with physics that its model lacks",
     run: |arguments| run(scenario("bench-law").args(arguments)),
 };

@@ -7,8 +7,8 @@ use std::collections::BTreeMap;
 
 pub(crate) const TASK: Task = Task {
     name: "bench-search",
-    does: "ours, NOMAD and differential evolution on paper-like sets [--sets 1,2,…] [--seeds N] [--evaluations N] \
-           [--seconds N] [--ours]",
+    does: "compares the delay search with NOMAD and differential evolution on paper-like sets [--sets 1,2,…] \
+           [--seeds N] [--evaluations N] [--seconds N] [--ours]",
     run: bench,
 };
 

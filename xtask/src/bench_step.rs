@@ -11,7 +11,7 @@ use std::process::Stdio;
 
 pub(crate) const TASK: Task = Task {
     name: "bench-step",
-    does: "instructions of a model step, ours against C by hand (gcc -O3, newlib) and exported C, under QEMU",
+    does: "instructions of a model step in model-core, in hand-written C (gcc -O3, newlib) and in exported C, under QEMU",
     run: bench_step,
 };
 
@@ -112,7 +112,7 @@ fn bench_step(_arguments: &[String]) -> Result<()> {
         differ,
     ] = words[..]
     else {
-        bail!("the program sent something else");
+        bail!("the program sent unexpected data");
     };
     let instructions = |ticks: f64| ticks * 1.25 / steps;
     for (what, ticks, most) in [
@@ -121,14 +121,14 @@ fn bench_step(_arguments: &[String]) -> Result<()> {
         ("C exported", exported, exported_most),
     ] {
         println!(
-            "{what:<10} {:>7.1} instructions a step, at most {:.0}; model-core takes {:.3} times as many",
+            "{what:<10} {:>7.1} instructions per step, at most {:.0}; model-core needs {:.3} times as many",
             instructions(ticks),
             most * 1.25,
             own / ticks
         );
     }
     println!(
-        "largest difference of y from the C by hand: {:.1e}",
+        "largest difference of y from the hand-written C: {:.1e}",
         apart * 1e-9
     );
     if differ > 0.0 {

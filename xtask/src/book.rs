@@ -9,6 +9,8 @@ use std::path::Path;
 use anyhow::{Context, Result, bail};
 use serde::Deserialize;
 
+mod residual;
+
 use crate::Task;
 use crate::shell::{command, exists, program, root, run, target};
 
@@ -47,7 +49,7 @@ pub(crate) fn book(arguments: &[String]) -> Result<()> {
     let check = match arguments {
         [] => false,
         [only] if only == "--check" => true,
-        _ => bail!("book takes --check and nothing else"),
+        _ => bail!("book accepts --check and no other option"),
     };
     let docs = root().join("docs");
     for (path, text) in pages()? {
@@ -57,7 +59,7 @@ pub(crate) fn book(arguments: &[String]) -> Result<()> {
             continue;
         }
         if check {
-            bail!("docs/{path} is not what the catalogue gives; run `cargo xtask book`");
+            bail!("docs/{path} differs from the catalogue; run `cargo xtask book`");
         }
         if let Some(folder) = file.parent() {
             fs::create_dir_all(folder)?;
@@ -95,21 +97,21 @@ fn contents(docs: &Path) -> Result<()> {
         let text = fs::read_to_string(docs.join(page))?;
         let lines = text.lines().count();
         if lines > LONGEST {
-            bail!("docs/{page} has {lines} lines; more than {LONGEST} are several pages");
+            bail!("docs/{page} has {lines} lines; split pages longer than {LONGEST}");
         }
         let folder = Path::new(page).parent().unwrap_or(Path::new(""));
         for link in targets(&text) {
             if !docs.join(folder).join(&link).exists() {
-                bail!("docs/{page} links to {link}, which is not there");
+                bail!("docs/{page} links to {link}, which does not exist");
             }
         }
     }
     for page in &listed {
         if !files.contains(page) {
-            bail!("docs/SUMMARY.md lists {page}, which is not there");
+            bail!("docs/SUMMARY.md lists {page}, which does not exist");
         }
     }
-    println!("{} pages, every link leads somewhere", listed.len());
+    println!("{} pages; every link has a target", listed.len());
     Ok(())
 }
 
@@ -169,11 +171,14 @@ fn pages() -> Result<Vec<(String, String)>> {
         ("effects.md".to_owned(), catalogue(&effects)),
         ("base-terms.md".to_owned(), base_terms(&base)),
     ];
-    all.extend(
-        effects
-            .iter()
-            .map(|effect| (format!("effects/{}.md", effect.name), page(effect))),
-    );
+    let program = program()?;
+    for effect in &effects {
+        let name = &effect.name;
+        let picture = residual::drawn(program.get_program(), name)?;
+        let parameters = picture.as_ref().map(|(_, parameters)| *parameters);
+        all.push((format!("effects/{name}.md"), page(effect, parameters)));
+        all.extend(picture.map(|(svg, _)| (format!("effects/{name}.svg"), svg)));
+    }
     Ok(all)
 }
 
@@ -182,9 +187,10 @@ const MADE: &str =
 
 fn catalogue(effects: &[Effect]) -> String {
     let mut text = format!(
-        "# The catalogue of effects\n\n{MADE}\nAn effect is one physical mechanism that a model can lack. `host-fit diagnose` tries all of them, `host-fit extend --effect NAME`\n\
-         adds one. The second column is what the records show; the name is what that is in a flow.\n\n\
-         | effect | records show | place |\n|---|---|---|\n"
+        "# The catalogue of effects\n\n{MADE}\nAn effect is one physical mechanism that a model can lack. \
+         `host-fit diagnose` tries all of them, `host-fit extend --effect NAME`\nadds one. The second column \
+         is what the records show; the name is its interpretation in a flow.\n\n| effect | records show | \
+         place |\n|---|---|---|\n"
     );
     for effect in effects {
         let shows = effect.shows.as_deref().unwrap_or(&effect.summary);
@@ -201,7 +207,8 @@ fn catalogue(effects: &[Effect]) -> String {
     text
 }
 
-fn page(effect: &Effect) -> String {
+/// The page of an effect; `simulated` are the parameters of its picture, if it has one.
+fn page(effect: &Effect, simulated: Option<&str>) -> String {
     let mut text = format!("# {}\n\n{MADE}\n", effect.name);
     let rows = [
         ("the records show", effect.shows.as_deref()),
@@ -220,6 +227,19 @@ fn page(effect: &Effect) -> String {
     }
     let _ = write!(text, "\n## Equation\n\n{}\n", quoted(&effect.equation));
     text.push_str(&parameters(effect));
+    if let Some(simulated) = simulated {
+        let with = match simulated {
+            "" => String::new(),
+            parameters => format!(" with {parameters}"),
+        };
+        let _ = write!(
+            text,
+            "\n## Residual\n\n![Response with and without {0}, and their difference]({0}.svg)\n\nSimulated{with}. Above: y \
+             with the effect, and y of the same model without it. Below: the difference, which is\nthe residual of the model \
+             without the effect. A refit of the other parameters reduces it and keeps its characteristic part.\n",
+            effect.name
+        );
+    }
     let _ = write!(
         text,
         "\n## Use\n\n    host-fit extend model.toml DATASET --effect {} -o better.toml\n",
@@ -230,7 +250,8 @@ fn page(effect: &Effect) -> String {
 
 fn base_terms(terms: &[Effect]) -> String {
     let mut text = format!(
-        "# Terms of base models\n\n{MADE}\n`identify` adds these where they lower the validation error; `diagnose` never reports them as missing. `host-fit effects NAME` prints one.\n"
+        "# Terms of base models\n\n{MADE}\n`identify` adds one of these terms if it lowers the validation \
+             error; `diagnose` never reports them as missing. `host-fit effects NAME` prints one.\n"
     );
     for term in terms {
         let _ = write!(
@@ -245,8 +266,10 @@ fn base_terms(terms: &[Effect]) -> String {
         let _ = writeln!(text, "\nSource: {}.", term.source);
     }
     text.push_str(
-        "\n## flow-lag\n\nA second lag in series with the first (flow).\n\n    T2·q̇ = u(t − h) − q; q drives the recursion in the place of u(t − h)\n\n\
-         ## flow-memory\n\nA later lag of y in the recursion: the flow depends on its own past (flow).\n\n    adds a·y(t − T), and c·y(t − T)·u(t − h) while the command is on\n",
+        "\n## flow-lag\n\nA second lag in series with the first (flow).\n\n    T2·q̇ = u(t − h) − q; q \
+         replaces u(t − h) in the recursion\n\n## flow-memory\n\nA later lag of y in the recursion: the flow \
+         depends on its own past (flow).\n\n    a·y(t − T) is added, and c·y(t − T)·u(t − h) while the command \
+         is on\n",
     );
     text
 }

@@ -6,7 +6,7 @@ use anyhow::{Result, bail};
 
 pub(crate) const TASK: Task = Task {
     name: "browser",
-    does: "tests report and workbench in chromium; leaves pictures in target/browser; --bless takes them as looked at",
+    does: "tests report and workbench in chromium; leaves pictures in target/browser; --bless stores them as inspected",
     run: browser,
 };
 
@@ -14,7 +14,7 @@ pub(crate) fn browser(arguments: &[String]) -> Result<()> {
     let bless = match arguments {
         [] => false,
         [only] if only == "--bless" => true,
-        _ => bail!("browser takes --bless and nothing else"),
+        _ => bail!("browser accepts --bless and no other option"),
     };
     if !exists("chromium") {
         bail!("chromium is missing; run `cargo xtask setup`");

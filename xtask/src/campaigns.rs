@@ -6,37 +6,40 @@ use anyhow::Context;
 
 pub(crate) const EFFECTS: Task = Task {
     name: "hidden-effects",
-    does: "the diagnosis on rigs of all families that hide something; --help for its options",
+    does: "runs the diagnosis on simulated rigs of all families with hidden effects; --help for its options",
     run: |arguments| campaign("hidden-effects", arguments),
 };
 
 pub(crate) const CALIBRATE: Task = Task {
     name: "calibrate",
-    does: "error rates, coverage and power of the diagnosis: docs/calibration.md; a thousand mixed rigs take ten hours, `--first 200` two, and rows are kept; takes the options of hidden-effects",
+    does: "counts error rates, coverage and power of the diagnosis for docs/calibration.md; a thousand rigs \
+         take ten hours, `--first 200` two; results are kept; takes the options of hidden-effects",
     run: calibrate,
 };
 
 pub(crate) const TERMS: Task = Task {
     name: "hidden-terms",
-    does: "the search for unknown terms on rigs with physics that the catalogue lacks; --help for its options",
+    does: "runs the search for unknown terms on rigs with physics that the catalogue lacks; --help for its options",
     run: |arguments| campaign("hidden-terms", arguments),
 };
 
 pub(crate) const LITERATURE: Task = Task {
     name: "literature",
-    does: "the diagnosis on flows that others published, behind the instruments of a real rig; --help for its options",
+    does: "runs the diagnosis on published flows with realistic instruments; --help for its options",
     run: |arguments| campaign("literature", arguments),
 };
 
 pub(crate) const LAWS: Task = Task {
     name: "laws",
-    does: "laws on rigs whose plants share no code with the model: wrong refusals, laws that lose attachment, margins; --help for its options",
+    does: "tests laws on rigs whose plants share no code with the model: wrong refusals, laws that lose \
+         attachment, margins; --help for its options",
     run: |arguments| campaign("laws", arguments),
 };
 
 pub(crate) const KEPT: Task = Task {
     name: "kept-rigs",
-    does: "tests of the diagnosis that CI leaves out: rigs that it once told wrong, and measured sets in ../shared",
+    does: "runs tests of the diagnosis that CI leaves out: rigs that once got a wrong answer, and measured \
+         sets in ../shared",
     run: |_| {
         program()?;
         run(&mut cargo(&[

@@ -1,7 +1,7 @@
 //! The changelog from its fragments: `cargo xtask changelog`.
 //!
-//! A user-visible change comes with a file `changelog/KIND-WHAT.md`, so that two changes do not meet in one file. Its text is
-//! one entry. A release moves all of them into `CHANGELOG.md`.
+//! A user-visible change comes with a file `changelog/KIND-WHAT.md`, so that two changes do not edit the same file.
+//! Its text is one entry. A release moves all of them into `CHANGELOG.md`.
 
 use crate::Task;
 use crate::shell::root;
@@ -16,7 +16,7 @@ pub(crate) const TASK: Task = Task {
     run: |arguments| changelog(&root(), arguments),
 };
 
-/// Of the files' names, and as headings, in the order of a release.
+/// In the names of files, and as headings, in the order of a release.
 const KINDS: [(&str, &str); 4] = [
     ("added", "Added"),
     ("changed", "Changed"),
@@ -32,7 +32,7 @@ fn changelog(root: &Path, arguments: &[String]) -> Result<()> {
     let [version, date] = arguments else {
         ensure!(
             arguments.is_empty(),
-            "changelog takes nothing, or VERSION DATE"
+            "changelog accepts nothing, or VERSION DATE"
         );
         print!("{section}");
         return Ok(());

@@ -9,7 +9,7 @@ use std::process::Command;
 
 pub(crate) const TASK: Task = Task {
     name: "examples",
-    does: "runs examples/ on exported models and checks what they print",
+    does: "runs examples/ on exported models and checks their output",
     run: |_| examples(),
 };
 
@@ -96,7 +96,7 @@ fn in_folder(folder: &Path) -> Result<()> {
     scripts(folder)
 }
 
-/// What the Rust recipe prints, with the constants of the model that the C recipe has.
+/// The expected output of the Rust recipe, with the constants of the model of the C recipe.
 fn rust_loop(folder: &Path) -> Result<String> {
     let package = folder.join("rust-loop");
     std::fs::create_dir_all(package.join("src"))?;
@@ -107,7 +107,7 @@ fn rust_loop(folder: &Path) -> Result<String> {
     let manifest = manifest.replace("path = \"../../model-core\"", &own);
     ensure!(manifest.contains(&own), "the recipe's path of model-core");
     std::fs::write(package.join("Cargo.toml"), manifest)?;
-    // The versions of the workspace, which are there.
+    // The versions of the workspace, which are available offline.
     std::fs::copy(root().join("Cargo.lock"), package.join("Cargo.lock"))?;
     let mut export = program()?;
     export.args(["codegen", "firmware/identified/models/full.toml", "-o"]);

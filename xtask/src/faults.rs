@@ -1,6 +1,5 @@
-//! Fault injection: the firmware under QEMU with a sensor that falls ill, a loop
-//! that is late or hangs, and constants that are damaged. Each fault must shut
-//! the valve, stay latched with its reason, and leave a message in the log.
+//! Fault injection: the firmware under QEMU with a faulty sensor, a loop that is late or hangs, and damaged
+//! constants. Each fault must close the valve, stay latched with its reason, and leave a message in the log.
 
 use crate::Task;
 use crate::firmware::{build, qemu};
@@ -14,7 +13,8 @@ use std::time::{Duration, Instant};
 
 pub(crate) const TASK: Task = Task {
     name: "faults",
-    does: "fault injection under QEMU: each fault shuts the valve, is latched and logged; faults on the line; --model FILE",
+    does: "fault injection under QEMU: each fault closes the valve, is latched and logged; faults on the line; \
+         --model FILE",
     run: faults,
 };
 
@@ -124,7 +124,7 @@ fn dialogue(line: &mut Line) -> Result<()> {
     line.until("status", |answer| answer.starts_with("disarmed"))?;
     for (injection, reason) in INJECTED {
         line.until("arm", |answer| answer.starts_with("armed"))?;
-        // The flow must be held: before that, a stuck sensor shows in the residual first.
+        // The law must hold the flow first; before that, a stuck sensor would show in the residual first.
         line.until("status", |answer| {
             answer.contains("valve=1") && friction(answer).is_some_and(|y| y > 0.4)
         })?;
@@ -183,6 +183,6 @@ impl Line {
                 Err(_) => last.clear(),
             }
         }
-        bail!("after `{command}` the firmware goes on saying `{last}`")
+        bail!("after `{command}` the firmware still answers `{last}`")
     }
 }

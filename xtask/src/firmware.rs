@@ -54,7 +54,10 @@ impl Chosen {
                 "--board" => {
                     let known = BOARDS.into_iter().find(|board| board == value);
                     chosen.board = Some(known.with_context(|| {
-                        format!("no board `{value}`; there are {}", BOARDS.join(", "))
+                        format!(
+                            "there is no board `{value}`; there are {}",
+                            BOARDS.join(", ")
+                        )
                     })?);
                 }
                 "--model" => chosen.model = Some(value.into()),
@@ -74,7 +77,7 @@ impl Chosen {
         let constants = identified::of(model, rig)?;
         let elf = build(package(board), board, &[], Some(&constants)).with_context(|| {
             format!(
-                "{} does not fit the board; the message above says what of it",
+                "{} does not fit the board; see the message above",
                 named.display()
             )
         })?;

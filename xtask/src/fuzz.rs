@@ -7,7 +7,8 @@ use crate::shell::{run, scenario};
 
 pub(crate) const TASK: Task = Task {
     name: "fuzz",
-    does: "mutated files, frames and texts on every reader: `--minutes N`, shared by the targets; their names run only those",
+    does: "mutated files, frames and texts for every reader: `--minutes N`, shared by the targets; with their \
+         names only those",
     run: |arguments| run(scenario("fuzz").args(arguments)),
 };
 

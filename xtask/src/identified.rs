@@ -48,7 +48,7 @@ pub(crate) fn identified(arguments: &[String]) -> Result<()> {
             let equal = read(&written.join(name).with_extension("rs"))? == read(&kept)?;
             if !equal {
                 bail!(
-                    "{} is not what codegen writes now; run `cargo xtask identified`",
+                    "{} differs from the output of codegen; run `cargo xtask identified`",
                     kept.display()
                 );
             }

@@ -1,8 +1,8 @@
-//! Whether every crate that is published can be: its card is complete, its package holds all that it is compiled of, and
-//! cargo packs it.
+//! Checks that every published crate can be published: its metadata are complete, its package contains all files
+//! that are compiled, and cargo packs it.
 //!
-//! Cargo's own proof compiles each package (`--verify`), which takes minutes. The list of files that the compiler read for the
-//! program says the same of what lies outside of a package, at once.
+//! Cargo's own check compiles each package (`--verify`), which takes minutes. The list of files that the compiler
+//! read for the program shows files outside a package at once.
 
 use crate::Task;
 use crate::shell::{cargo, output, root, run, target};
@@ -13,11 +13,11 @@ use std::path::{Component, Path, PathBuf};
 
 pub(crate) const TASK: Task = Task {
     name: "package",
-    does: "packs every published crate and looks for what its package lacks; --verify compiles the packages, too",
+    does: "packs every published crate and searches for missing files and metadata; --verify compiles the packages, too",
     run: package,
 };
 
-/// The programs whose lists of files are read: together they are made of every published crate.
+/// The programs whose lists of files are read; together they contain every published crate.
 const PROGRAMS: [&str; 2] = ["host-fit", "firmware-sim"];
 
 #[derive(Deserialize)]
@@ -25,12 +25,12 @@ struct Metadata {
     packages: Vec<Card>,
 }
 
-/// What a registry and its users want to know of a crate.
+/// Metadata of a crate that a registry and its users need.
 #[derive(Clone, Deserialize)]
 struct Card {
     name: String,
     manifest_path: PathBuf,
-    /// Empty where the crate is not published.
+    /// Empty if the crate is not published.
     publish: Option<Vec<String>>,
     description: Option<String>,
     license: Option<String>,
@@ -127,7 +127,7 @@ fn files(mut list: std::process::Command, name: &str) -> Result<BTreeSet<PathBuf
     Ok(list.lines().map(PathBuf::from).collect())
 }
 
-/// What the crates do not say of themselves, one line each.
+/// Missing metadata of the crates, one line each.
 fn cards(published: &[Card]) -> Vec<String> {
     let mut faults = Vec::new();
     for card in published {
@@ -167,7 +167,7 @@ fn cards(published: &[Card]) -> Vec<String> {
     faults
 }
 
-/// The project's files that the programs are compiled of and no package has.
+/// The project's files that the programs are compiled from and no package contains.
 fn outside(packed: &BTreeSet<PathBuf>) -> Result<Vec<String>> {
     // `cargo test` compiles the programs without these lists.
     let mut build = cargo(&["build", "--release", "--quiet"]);
@@ -187,7 +187,7 @@ fn outside(packed: &BTreeSet<PathBuf>) -> Result<Vec<String>> {
     let missing = missing.iter().map(|file| {
         let file = file.strip_prefix(&root).unwrap_or(file);
         format!(
-            "{}: compiled into the program, and in no package",
+            "{}: compiled into the program, but in no package",
             file.display()
         )
     });
@@ -199,7 +199,7 @@ fn read_files(rule: &str) -> BTreeSet<PathBuf> {
     let Some((_, files)) = rule.lines().next().and_then(|line| line.split_once(": ")) else {
         return BTreeSet::new();
     };
-    // A space of a name has a backslash before it.
+    // A space in a name is preceded by a backslash.
     let files = files.replace("\\ ", "\0");
     let files = files.split_whitespace().map(|file| file.replace('\0', " "));
     files.map(|file| straight(Path::new(&file))).collect()

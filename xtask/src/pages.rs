@@ -1,6 +1,7 @@
 //! The scripts and styles of pages: checked, tested and bundled from `host-fit/web`.
 //!
-//! The bundle is checked in, so that building the program needs no node; `--check` proves that it is what the sources give.
+//! The bundle is checked in, so that building the program needs no node; `--check` verifies that it equals the
+//! sources.
 
 use crate::Task;
 use crate::shell::{command, root, run};
@@ -18,7 +19,7 @@ pub(crate) fn pages(arguments: &[String]) -> Result<()> {
     let check = match arguments {
         [] => false,
         [only] if only == "--check" => true,
-        _ => bail!("pages takes --check and nothing else"),
+        _ => bail!("pages accepts --check and no other option"),
     };
     let web = root().join("host-fit/web");
     let npm = |arguments: &[&str]| {
@@ -26,7 +27,7 @@ pub(crate) fn pages(arguments: &[String]) -> Result<()> {
         npm.current_dir(&web);
         run(&mut npm)
     };
-    // The versions of the lock file; nothing of a package is run while it is installed.
+    // The versions of the lock file; scripts of packages are not run at installation.
     npm(&["ci", "--ignore-scripts", "--no-audit", "--no-fund"])?;
     npm(&["run", "check"])?;
     npm(&["test"])?;
@@ -53,12 +54,12 @@ fn same(checked_in: &Path, made: &Path) -> Result<()> {
     };
     let all = names(made)?;
     if names(checked_in)? != all {
-        bail!("the bundle has other files than the sources give; run `cargo xtask pages`");
+        bail!("the bundle has other files than the sources produce; run `cargo xtask pages`");
     }
     for name in all {
         if fs::read(checked_in.join(&name))? != fs::read(made.join(&name))? {
             bail!(
-                "bundle/{} is not what the sources give; run `cargo xtask pages`",
+                "bundle/{} differs from the sources; run `cargo xtask pages`",
                 name.display()
             );
         }

@@ -1,6 +1,5 @@
-//! The processor in the loop: builds the program for the board, with a case for
-//! every effect and kind of law or with the user's model, and has it run in
-//! lockstep with model and plant on the host (`scenarios::lockstep`).
+//! The processor in the loop: builds the program for the board, with a case for every effect and kind of law or
+//! with the user's model, and runs it in lockstep with model and plant on the host (`scenarios::lockstep`).
 
 use crate::Task;
 use crate::firmware::{Size, build, qemu, size};
@@ -29,7 +28,7 @@ pub(crate) struct Outcome {
     pub(crate) size: Size,
 }
 
-/// What the program on the host reports.
+/// The report of the program on the host.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Report {
@@ -95,7 +94,7 @@ pub(crate) fn pil(arguments: &[String]) -> Result<Outcome> {
     })
 }
 
-/// The folder of constants that the board's program is built with.
+/// The folder of constants with which the board's program is built.
 fn constants(model: Option<&Path>, periods: Option<&String>) -> Result<PathBuf> {
     if let Some(model) = model {
         return crate::identified::of(Some(model), None);

@@ -1,8 +1,7 @@
-//! Installs what cross builds, board runs and pages need.
+//! Installs the requirements of cross builds, board runs and pages.
 //!
-//! Where rustup manages the toolchain it fetches the targets' `core`. Where the
-//! compiler is a distribution's own, Debian's `rustc-web` with `rust-web-src`
-//! builds `core` from source.
+//! If rustup manages the toolchain, it downloads the targets' `core`. If the compiler is a distribution's own,
+//! Debian's `rustc-web` with `rust-web-src` builds `core` from source.
 
 use crate::Task;
 use crate::shell::{cargo, command, exists, output, run};
@@ -26,12 +25,12 @@ pub(crate) const TARGETS: [&str; 3] = [
 /// Debian's compiler; `core` is built by it from `rust-web-src`.
 const DEBIAN_RUSTC: &str = "/usr/bin/rustc";
 
-/// Where `core` for the targets comes from.
+/// Source of `core` for the targets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Core {
-    /// The toolchain in use has it built.
+    /// The toolchain in use contains it.
     Prebuilt,
-    /// The toolchain in use has its source.
+    /// The toolchain in use contains its source.
     FromSource,
     /// Debian's compiler has its source.
     FromDebianSource,
@@ -51,7 +50,7 @@ pub(crate) fn setup(_arguments: &[String]) -> Result<()> {
     .into_iter()
     .filter(|(program, _)| !exists(program))
     .map(|(_, package)| package)
-    // No program of its own: asked for as Python would ask for it.
+    // Not a program: checked by importing it in Python.
     .chain(python().is_err().then_some("python3-numpy"))
     // Makes virtual environments.
     .chain((!python().is_ok_and(|python| imports(python, "ensurepip"))).then_some("python3-venv"))
@@ -95,7 +94,7 @@ fn install(packages: &[&str]) -> Result<()> {
         apt.env("DEBIAN_FRONTEND", "noninteractive");
         apt
     };
-    // Lists may be old but good enough: only a failed install asks for new ones.
+    // Package lists may be old but good enough, so they are updated only after a failed install.
     let mut arguments = vec!["install", "--yes", "--quiet", "--no-install-recommends"];
     arguments.extend(packages);
     if run(&mut apt(&arguments)).is_ok() {
@@ -150,11 +149,11 @@ fn core_source() -> Option<Core> {
     has_source.then_some(Core::FromDebianSource)
 }
 
-/// `cargo` with what it takes to build for `target`; the caller adds the
-/// subcommand's own arguments.
+/// `cargo` with the options to build for `target`; the caller adds the subcommand's own arguments.
 pub(crate) fn cross_cargo(subcommand: &str, target: &str) -> Result<Command> {
     let mut build = cargo(&[subcommand, "--release", "--target", target]);
-    // In pieces, the same source takes other instructions: the worst sample of a law 2.5 times as many.
+    // With several codegen units, the same source gives other instructions: the worst sample of a law needs 2.5
+    // times as many.
     build.env("CARGO_INCREMENTAL", "0");
     let core = core_source().context("no `core` for the boards; run `cargo xtask setup`")?;
     if core != Core::Prebuilt {

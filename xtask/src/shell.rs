@@ -23,10 +23,10 @@ pub(crate) fn cargo(arguments: &[&str]) -> Command {
     command(&program, arguments)
 }
 
-/// Set where the workspace's programs are built: nothing then waits until another step's compiler has ended.
+/// Set if the workspace's programs are built already; a step then need not wait for another step's compiler.
 pub(crate) const BUILT: &str = "XTASK_BUILT";
 
-/// A program of the scenarios, its arguments to follow.
+/// A program of the scenarios; arguments follow.
 pub(crate) fn scenario(program: &str) -> Command {
     if std::env::var_os(BUILT).is_some() {
         return built(program);
@@ -36,7 +36,7 @@ pub(crate) fn scenario(program: &str) -> Command {
     command
 }
 
-/// `host-fit` as it is now, its arguments to follow.
+/// The present `host-fit`; arguments follow.
 pub(crate) fn program() -> Result<Command> {
     if std::env::var_os(BUILT).is_none() {
         run(&mut cargo(&[
@@ -58,8 +58,8 @@ fn built(program: &str) -> Command {
     command
 }
 
-/// `cargo` in the firmware's workspace, with a target folder of its own: the
-/// two workspaces build the same crates with other features.
+/// `cargo` in the firmware's workspace, with a separate target folder, because the two workspaces build the same
+/// crates with different features.
 pub(crate) fn firmware_cargo(arguments: &[&str]) -> Command {
     let mut command = cargo(arguments);
     command

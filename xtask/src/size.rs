@@ -1,4 +1,4 @@
-//! What takes the flash of a board's program: by crate and by symbol.
+//! Use of the flash in a board's program, by crate and by symbol.
 
 use crate::Task;
 use crate::elf::{Elf, Symbol};
@@ -57,7 +57,7 @@ fn size(arguments: &[String]) -> Result<()> {
     Ok(())
 }
 
-/// The name as it was written, without the compiler's hash.
+/// The name as written in the source, without the compiler's hash.
 fn readable(mangled: &str) -> String {
     format!("{:#}", rustc_demangle::demangle(mangled))
 }

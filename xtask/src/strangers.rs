@@ -1,4 +1,4 @@
-//! Records as strangers bring them: `cargo xtask strangers`.
+//! Records from other loggers: `cargo xtask strangers`.
 
 use crate::Task;
 use crate::shell::{cargo, root, run, scenario};
@@ -7,17 +7,17 @@ use std::process::Stdio;
 
 pub(crate) const TASK: Task = Task {
     name: "strangers",
-    does: "the program on records as strangers bring them, beside the baselines; --drawn COUNT draws others from a seed; --page writes docs/strangers.md, --help has the other options",
+    does: "identifies and diagnoses records from other loggers and compares with baseline models; --drawn COUNT draws records from a seed; --page writes docs/strangers.md, --help has the other options",
     run: strangers,
 };
 
 const HEAD: &str = "\
-# Records as strangers bring them
+# Records from other loggers
 
 Written by `cargo xtask strangers --page`. The sets are described in
-[tests/data/strangers](../tests/data/strangers/README.md). FIT in percent, on the validation records, or on the
-estimation records where nothing was held out (own). FOPDT and SOPDT: first and second order with dead time, fitted in
-free run; ARX: ARX(2,2). *edges* is the mean delay that `delay` measures, in samples.
+[tests/data/strangers](../tests/data/strangers/README.md). FIT in percent, on the validation records; \"(own)\" on the
+estimation records, where no record is for validation. FOPDT and SOPDT: first and second order with dead time, fitted in
+free run. ARX: ARX(2,2). *edges* is the mean delay that `delay` measures, in samples.
 
 ";
 /// The drawn sets of the page.
@@ -25,10 +25,15 @@ const DRAWN: [&str; 4] = ["--drawn", "320", "--seed", "2026"];
 const DRAWN_HEAD: &str = "
 ## Drawn from a seed
 
-`cargo xtask strangers --drawn 320 --seed 2026`: sixteen kinds of records in turn, of linear plants with one to three lags
-and a dead time, written as different loggers write them. A case is right if nothing is named that the rig does not have,
-another input that drives y is named, the interval of the dead time holds the true one, the model is not below the best
-baseline by more than a point of FIT, and every printed error is that of the written file. Shares with 95 % bounds.
+`cargo xtask strangers --drawn 320 --seed 2026`: records of linear plants with one to three lags and a dead time, written
+in the formats of different loggers; twenty records of each of sixteen kinds. A case is right if all of these hold:
+
+- no effect is named that the plant does not have, and another input that drives y is named;
+- the interval of the dead time contains the true one;
+- the FIT of the model is at most one point below that of the best baseline;
+- every printed error is that of the written file.
+
+Shares with 95 % bounds.
 
 ";
 
@@ -47,7 +52,7 @@ fn strangers(arguments: &[String]) -> Result<()> {
     Ok(())
 }
 
-/// What the program prints. What is wrong stands there: its exit code does not matter here.
+/// The output of the program, which contains any errors; the exit code is not needed here.
 fn table(arguments: &[&str]) -> Result<String> {
     let output = scenario("strangers")
         .args(arguments)

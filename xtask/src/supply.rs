@@ -1,7 +1,6 @@
-//! The dependencies of both workspaces against `deny.toml`: licences, sources, versions.
+//! Checks the dependencies of both workspaces against `deny.toml`: licences, sources, versions.
 //!
-//! `cargo deny` reads the same file and knows more (advisories, for which it asks the network); this needs nothing that is not
-//! in the tree.
+//! `cargo deny` reads the same file and checks more (advisories, which need the network); this check works offline.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -64,7 +63,7 @@ struct Skip {
     reason: String,
 }
 
-/// What of `cargo metadata` is read here.
+/// The fields of `cargo metadata` that are read here.
 #[derive(Deserialize)]
 struct Metadata {
     packages: Vec<Package>,
@@ -111,7 +110,7 @@ fn metadata(workspace: &Path, targets: &[String]) -> Result<Metadata> {
     Ok(serde_json::from_slice(&output.stdout)?)
 }
 
-/// What is against the rules, one line each.
+/// Violations of the rules, one line each.
 fn faults(workspaces: &[Vec<Package>], rules: &Rules) -> Vec<String> {
     let mut faults = Vec::new();
     let mut versions: BTreeMap<(&str, usize), BTreeSet<&str>> = BTreeMap::new();
@@ -171,7 +170,8 @@ fn faults(workspaces: &[Vec<Package>], rules: &Rules) -> Vec<String> {
     faults
 }
 
-/// Whether an SPDX expression can be satisfied with what is allowed: `AND` binds more than `OR`, and `/` is an old `OR`.
+/// Whether an SPDX expression can be satisfied with the allowed licences: `AND` has precedence over `OR`, and `/`
+/// is an old `OR`.
 fn is_allowed(expression: &str, allowed: &impl Fn(&str) -> bool) -> bool {
     let text = expression
         .replace('/', " OR ")

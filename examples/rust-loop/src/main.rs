@@ -1,4 +1,4 @@
-//! The exported law holds the exported model in a loop of your own; `identified.rs` is what `codegen` wrote.
+//! The exported law controls the exported model in your own loop; `identified.rs` was written by `codegen`.
 
 #[allow(dead_code)]
 mod identified;

@@ -16,10 +16,10 @@ use crate::plant::{
 use crate::recording::RigError;
 use crate::stream::{Stream, stream};
 
-/// Number of draws of an effect before the heaviest so far is used.
+/// Number of draws of an effect, after which the one with the largest weight so far is used.
 const ATTEMPTS: usize = 12;
 
-/// An effect as it is drawn: of the catalogue, altered, or beyond the catalogue.
+/// A drawn effect: of the catalogue, altered, or outside the catalogue.
 enum Drawn {
     Effect(Effect),
     Altered(Altered),

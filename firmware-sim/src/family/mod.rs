@@ -112,7 +112,7 @@ impl NoiseKind {
     }
 }
 
-/// Number of flows that are drawn; the one with the heaviest effects is used.
+/// Number of flows that are drawn; the one with the largest weight of its effects is used.
 const FLOWS: usize = 5;
 
 /// Largest number of averaged repeats, if twenty do not show the hidden effect.
@@ -135,7 +135,7 @@ pub struct RigPlan {
     pub free_stream: bool,
     /// Units of the recorded data.
     pub units: Units,
-    /// Weight of the lightest hidden effect; below 1 it is not detectable. Infinite if nothing was weighed.
+    /// Weight of the lightest hidden effect; below 1 it is not detectable. Infinite without a weighed effect.
     pub weight: f64,
     /// Seed of commands, free stream and noise.
     pub seed: u64,
@@ -145,13 +145,14 @@ impl RigPlan {
     /// A random rig of a family that hides the named effects: of the catalogue, laws of
     /// [`Altered`](crate::plant::Altered), physics [`Beyond`](crate::plant::Beyond) it, or [`Fault`](crate::plant::Fault)s.
     ///
-    /// Effects are drawn from their usual ranges until they matter, and the flow anew where none does: on a
-    /// telegraph they change the readings by four standard errors of the average; by 1.2 that no change of the
-    /// flow's gain, time constants, delay and zero imitates; and by 0.6 that no memory of the flow up to 0.48 s,
-    /// alone and times the jet, imitates either, so that the best model without the effect is left at 1.17 times
-    /// the noise floor. Short lags are not among what may imitate: lags in series commute, and a lag of the
-    /// sensor is one of the flow. Where no flow shows them so, more than twenty repeats are averaged.
-    /// [`weight`](Self::weight) is below 1 where this could not be had.
+    /// Effects are drawn from their usual ranges until they are detectable, and the flow is drawn anew if none is.
+    /// Detectable means three changes of the readings on a random on/off command, in standard errors of the
+    /// average. The total change is at least 4. The part that no change of the flow's gain, time constants, delay
+    /// and zero imitates is at least 1.2. The part that no memory of the flow up to 0.48 s imitates either, alone
+    /// and times the jet, is at least 0.6; the best model without the effect then has an error of 1.17 × the noise
+    /// level. Short lags are not among the imitations, because lags in series commute: a lag of the sensor equals
+    /// one of the flow. If no flow satisfies these conditions, more than twenty repeats are averaged.
+    /// [`weight`](Self::weight) is below 1 if even that does not suffice.
     ///
     /// # Errors
     /// [`RigError`] for unknown names and for effects that exclude each other.
@@ -212,7 +213,7 @@ impl RigPlan {
         self
     }
 
-    /// The names that a diagnosis should find: hidden effects of the catalogue, also with another law.
+    /// The names that a diagnosis should find: hidden effects of the catalogue, also with an altered equation.
     pub fn hidden(&self) -> Vec<&'static str> {
         let effects = self.plant.effects.iter().map(Effect::name);
         let altered = self.plant.altered.iter().map(|e| e.resembles());
@@ -225,15 +226,15 @@ impl RigPlan {
         delay.into_iter().chain(self.nuisances.effect()).collect()
     }
 
-    /// Hidden effects of the catalogue with their true parameters, in the rig's own units; effects with other
-    /// laws have none.
+    /// Hidden effects of the catalogue with their true parameters, in the rig's own units; effects with altered
+    /// equations have none.
     pub fn exact(&self) -> Vec<(&'static str, Vec<Parameter>)> {
         let effects = self.plant.effects.iter();
         effects.map(|e| (e.name(), e.parameters())).collect()
     }
 
-    /// The commands of the set: a step, squares and random telegraphs, five to identify on and three held
-    /// out; many levels when the input is graded or a hidden effect only shows with those.
+    /// The commands of the set: a step, square waves and random on/off commands, five for estimation and three for
+    /// validation. They have many levels if the input is graded or a hidden effect requires it.
     pub fn commands(&self) -> Vec<(Command, Use)> {
         let mut rng = stream(self.seed, Stream::Commands);
         let squares = draw::squares(&mut rng);
@@ -274,8 +275,8 @@ impl RigPlan {
             quoted.join(", ")
         };
         let mut text = format!(
-            "# what is hidden in this set\n\nfamily = \"{}\"\nhidden = [{}]\nalso_right = [{}]\n\
-             noise = \"{}\"\nstandard_error = {:.5}\nseed = {}\n",
+            "# the hidden effects of this set\n\nfamily = \"{}\"\nhidden = [{}]\nalso_right = [{}]\nnoise = \
+             \"{}\"\nstandard_error = {:.5}\nseed = {}\n",
             self.family.name(),
             list(self.hidden()),
             list(self.also_right()),
@@ -287,15 +288,15 @@ impl RigPlan {
         if self.weight.is_finite() {
             let _ = writeln!(
                 text,
-                "# at least 1 if it matters\nweight = {:.2}",
+                "# at least 1 if detectable\nweight = {:.2}",
                 self.weight
             );
         }
         if self.units != Units::OWN {
             let _ = write!(
                 text,
-                "\n# what follows is in the rig's own units; recorded times and y are these times the factors\n\
-                 [units]\ntime = {}\ny = {}\n",
+                "\n# the following is in the rig's own units; recorded times and y are these, multiplied by \
+                 the factors\n[units]\ntime = {}\ny = {}\n",
                 self.units.time, self.units.y
             );
         }
@@ -360,7 +361,7 @@ mod tests {
         }
     }
 
-    /// An echo of opposite sign drives the flow below rest, one of equal sign above full strength.
+    /// An echo of opposite sign drives the flow below rest; one of equal sign drives it above full strength.
     #[test]
     fn no_flow_runs_away() {
         let draw =

@@ -47,7 +47,7 @@ impl Weight {
     /// Samples used for effects of the catalogue.
     pub(super) const SAMPLES: usize = 5000;
 
-    /// For effects that are added to `bare`.
+    /// Prepares them for effects that are added to `bare`.
     pub(super) fn new(
         bare: &PlantSpec,
         levels: &[f64],
@@ -187,7 +187,7 @@ mod tests {
         let bare = PlantSpec::new(BasePlant::draw(&mut rng), &[]);
         let levels = &command.levels[..Weight::SAMPLES];
         let weight = Weight::new(&bare, levels, None, 0.01).unwrap();
-        // A gain increased by a half is a large change, but only of the constants.
+        // A gain increased by a half is a large change, but one of the constants only.
         let mut louder = bare.clone();
         louder.base.gain *= 1.5;
         assert!(weight.of(&louder).unwrap() < 0.05);

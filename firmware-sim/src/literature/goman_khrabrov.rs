@@ -7,9 +7,10 @@
 //!
 //! and τ₂·α̇_e = α − Δα·j − α_e: jets of strength j lower the effective incidence.
 //!
-//! From the publication: the form of the equations and the order of the times for a thick symmetric section
-//! (τ₁ near 0.5 c/V, τ₂ near 4.5 c/V). Ours: the static curve (α* = 15°, σ = 1.5°), an incidence of 18°, jets
-//! worth 6°, c/V of 18–30 ms, and the carrier of the jets: they travel from the slot at a speed that grows with x.
+//! From the publication: the form of the equations and the order of the times for a thick symmetric section (τ₁
+//! near 0.5 c/V, τ₂ near 4.5 c/V). Our choice: the static curve (α* = 15°, σ = 1.5°), an incidence of 18°, a
+//! reduction by the jets of 6°, c/V of 18–30 ms, and the transport of the jets: they travel from the slot at a
+//! speed that increases with x.
 
 use super::{Flow, Published, STEP_S};
 use rand::RngExt;
@@ -70,7 +71,7 @@ impl GomanKhrabrov {
 
 impl Flow for GomanKhrabrov {
     fn step(&mut self, jet: f64) {
-        // A way of 1 leads from the slot to the separated flow.
+        // A distance of 1 leads from the slot to the separated flow.
         self.way += STEP_S / self.carrying_s * (1.0 + self.faster * self.x);
         self.on_their_way.push_back((self.way, jet));
         while let Some(&(begun, strength)) = self.on_their_way.front()

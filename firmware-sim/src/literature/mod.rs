@@ -1,9 +1,8 @@
 //! Flows that others published, simulated from their equations, behind the instruments of a real rig.
 //!
-//! Each file holds one model with its reference, equations and coefficients, and checks one response against
-//! the publication. The models share no code or constants with the rigs of [`crate::family`], with the
-//! model that is fitted, or with each other. A diagnosis that was tuned on our own rigs meets here a flow
-//! that nobody tuned it on.
+//! Each file contains one model with its reference, equations and coefficients, and checks one response against the
+//! publication. The models share no code or constants with the rigs of [`crate::family`], with the fitted model, or
+//! with each other. They test a diagnosis that was tuned on our own rigs with flows for which it was not tuned.
 //!
 //! Signals, all of order 1: command u → valve (dead time) → jet strength → flow → reading y. Every model
 //! scales its reading to 0 without jets and 1 under steady jets.
@@ -106,7 +105,7 @@ mod tests {
         assert!(Published::of("gremlin").is_none());
     }
 
-    /// Hidden effects change the strength of the jets continuously, and the flows still answer pulses.
+    /// Hidden effects change the strength of the jets continuously, and the flows must still respond to pulses.
     #[test]
     fn every_flow_answers_pulses_through_every_effect() {
         for model in PUBLISHED {

@@ -10,9 +10,9 @@
 //!
 //! From the publication: M. Kiya and K. Sasaki, Structure of a turbulent separation bubble, Journal of Fluid
 //! Mechanics 137 (1983), 83–113, put the slow unsteadiness of the bubble at f·x_R/U = 0.12: τ = x_R/(2π·0.12·U).
-//! Ours: jets that raise entrainment by 0.4 to 0.8, x_R/U of 50–90 ms, and the reading: a film at 0.82 of the
+//! Our choice: jets that raise entrainment by 0.4 to 0.8, x_R/U of 50–90 ms, and the reading: a film at 0.82 of the
 //! bubble's length, whose friction turns from backflow to attached over a tenth of x_R as the reattachment passes.
-//! Jets arrive after a passage of the shear layer at half of U over the slot's distance.
+//! The jets travel from the slot with the shear layer, at half of U.
 
 use super::{Flow, Published, STEP_S};
 use rand::RngExt;

@@ -19,7 +19,7 @@ const ZERO_OF_A_DAY: f64 = 0.01;
 /// Number of records of the first day; the others are of the second.
 const FIRST_DAY: usize = 4;
 
-/// No published flow or hidden effect of that name.
+/// No published flow or hidden effect has that name.
 #[derive(Clone, Debug, Error, PartialEq)]
 #[error("there is no `{name}`; the names are: {}", names.join(", "))]
 pub struct UnknownName {
@@ -167,7 +167,7 @@ impl LiteraturePlan {
     /// Runs the rig through every command and measures it.
     ///
     /// # Errors
-    /// [`RigError`] when the readings are no recording.
+    /// [`RigError`] if the readings are not a valid recording.
     pub fn build(&self) -> Result<Recorded, RigError> {
         let mut noise = draws(self.seed, Draws::Noise);
         let (mut records, mut noise_free) = (Vec::new(), Vec::new());
@@ -199,8 +199,8 @@ impl LiteraturePlan {
             quoted.join(", ")
         };
         let mut text = format!(
-            "# what is hidden in this set\n\nmodel = \"{}\"\nreference = \"{}\"\nhidden = [{}]\n\
-             also_right = [{}]\nreal_instruments = {}\nseed = {}\n",
+            "# the hidden effects of this set\n\nmodel = \"{}\"\nreference = \"{}\"\nhidden = [{}]\nalso_right \
+             = [{}]\nreal_instruments = {}\nseed = {}\n",
             self.model.name,
             self.model.reference,
             list(&self.names()),

@@ -9,8 +9,9 @@
 //!
 //! T·ṡ = j − s with T for attachment or separation;  ṗ = (p_line − p)/τ_fill open, −p/τ_vent closed;  j = √p
 //!
-//! From the publication: the wave equation's characteristics and a = 343 m/s. Ours: all times, L of 1–2.5 m, an
-//! impedance of 0.05–0.12 of the supply pressure per full flow, of which a wave keeps 0.8 there and back.
+//! From the publication: the wave equation's characteristics and a = 343 m/s. Our choice: all times, L of 1–2.5 m,
+//! an impedance of 0.05–0.12 of the supply pressure per full flow, and a factor of 0.8 on a wave that travels to
+//! the reservoir and back.
 
 use super::{Flow, Published, STEP_S};
 use rand::RngExt;
@@ -121,7 +122,7 @@ impl Flow for SuppliedValve {
         self.chamber += STEP_S / time * (target - self.chamber);
         self.delayed.push_back(self.chamber.max(0.0).sqrt());
         let j = self.delayed.pop_front().unwrap_or(0.0);
-        // Attaching in proportion to the jet, separating otherwise.
+        // The flow attaches in proportion to the jet, and separates otherwise.
         let time = self.separating_s + (self.attaching_s - self.separating_s) * j.min(1.0);
         self.friction += STEP_S / time * (j - self.friction);
     }

@@ -8,9 +8,9 @@
 //!
 //! L(s)/j(s) = exp(−θ·s)·(1 − T_z·s)/((1 + T₁·s)·(1 + T₂·s))
 //!
-//! From the publication: times scale with c/U; lift reverses at once, is largest at t⁺ = t·U/c = 3 and back at
-//! rest by t⁺ = 15. Ours: coefficients with that response, θ⁺ = 0.5, T_z⁺ = 1, T₁⁺ = 4, T₂⁺ = 1, each varied
-//! by up to a tenth, and c/U of 15–25 ms.
+//! From the publication: times scale with c/U; lift reverses at once, is largest at t⁺ = t·U/c = 3 and back at rest
+//! by t⁺ = 15. Our choice: coefficients with that response, θ⁺ = 0.5, T_z⁺ = 1, T₁⁺ = 4, T₂⁺ = 1, each varied by up
+//! to a tenth, and c/U of 15–25 ms.
 
 use super::{Flow, Published, STEP_S};
 use rand::RngExt;

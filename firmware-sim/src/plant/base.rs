@@ -72,7 +72,7 @@ impl FlowDelay {
         }
     }
 
-    /// The same law with every delay `factor` times as long.
+    /// The same law with every delay multiplied by `factor`.
     #[must_use]
     pub fn scaled(self, factor: f64) -> Self {
         match self {

@@ -75,7 +75,7 @@ pub enum Character {
 const SLOWEST: f64 = 0.1;
 
 impl Character {
-    /// Number of continuous states beside the friction.
+    /// Number of continuous states in addition to the friction.
     pub(crate) fn states(&self) -> usize {
         match self {
             Self::FirstOrder | Self::RateOfFriction { .. } => 0,
@@ -174,7 +174,7 @@ impl Character {
                     within("memory_limit", term.limit, 1e-6, f64::INFINITY, "above 0")?;
                 }
                 let reach = |size: fn(&PastTerm) -> f64| terms.iter().map(size).sum::<f64>();
-                let requirement = "below 1 together, or the flow runs away by itself";
+                let requirement = "below 1 together, or the flow diverges by itself";
                 within(
                     "memory_gain",
                     reach(|t| t.gain.abs()),

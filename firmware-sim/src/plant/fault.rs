@@ -3,7 +3,7 @@
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-/// A fault that repeats in every repeat of a record, so that averaging does not remove it.
+/// A fault that occurs in every repeat of a record, so that averaging does not remove it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Fault {
     /// The valve ignores every n-th pulse of the record.

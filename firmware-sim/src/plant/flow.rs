@@ -8,7 +8,7 @@ use crate::waveform::{Cursor, Waveform};
 /// Friction, states of the flow's character and memory of each part; or their derivatives.
 type State = Vec<f64>;
 
-/// Friction s and the memories beside it.
+/// Friction s and the other states.
 #[derive(Debug, Clone)]
 pub(crate) struct Flow {
     rate_on: f64,

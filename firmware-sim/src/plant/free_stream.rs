@@ -10,10 +10,10 @@ pub const MEAN_FREE_STREAM: f64 = 10.0;
 pub(crate) const MEAN_TEMPERATURE: f64 = 20.0;
 
 /// U∞(t): a mean and three slow waves, the same in every repeat of the record; and the temperature of the air,
-/// which goes its own way.
+/// which varies independently.
 ///
-/// The mean over the sampled record is exactly [`MEAN_FREE_STREAM`], so "its mean" is the same number
-/// for one record and for all.
+/// The mean over the sampled record is exactly [`MEAN_FREE_STREAM`], so "its mean" is the same number for one
+/// record and for all records.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FreeStream {
     /// (amplitude in m/s, frequency in Hz, phase in rad)

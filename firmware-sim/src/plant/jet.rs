@@ -5,7 +5,8 @@ use super::part::{JetPart, Piece};
 use super::{LONGEST_DELAY_S, SHORTEST_PIECE_S};
 use crate::waveform::Waveform;
 
-/// The jet's dynamics, upstream of the transport delay and independent of the flow, so that it may run ahead.
+/// The jet's dynamics, upstream of the transport delay. They do not depend on the flow and may be computed ahead of
+/// it.
 #[derive(Debug, Clone)]
 pub(crate) struct Jet {
     parts: Vec<Box<dyn JetPart>>,

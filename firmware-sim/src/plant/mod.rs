@@ -1,6 +1,6 @@
-//! Plants: the rig as physics, stepped far below the sample period, with delays that are true delays.
+//! Plants: the physics of a rig in time steps far below the sample period, with exact delays.
 //!
-//! Nothing here is shared with `model-core`: these plants judge the model, so they must not repeat its
+//! Nothing here is shared with `model-core`, because these plants test the model and must not repeat its
 //! discretisation. The signals run command → valve → plenum → jet → transport → flow → film → reading.
 
 pub mod altered;
@@ -46,7 +46,7 @@ const SHORTEST_PIECE_S: f64 = 1e-9;
 
 /// A plant for a controller: one command in, one reading out, every millisecond.
 pub trait Plant {
-    /// Holds the valve command for one sample period, then reads the sensor (y, with noise and
-    /// converter where the plant has them).
+    /// Holds the valve command for one sample period, then reads the sensor (y, with noise and converter if the
+    /// plant has them).
     fn step(&mut self, command: bool) -> f64;
 }

@@ -121,7 +121,7 @@ pub(crate) trait FlowPart: Debug + Send + Sync + BoxedFlow {
     /// The arriving jet jumps to `jet`.
     fn arrives(&mut self, _jet: f64) {}
 
-    /// A piece of the arriving jet has passed; the friction is now `s`.
+    /// Called after a piece of the arriving jet; the friction is now `s`.
     fn passed(&mut self, _jet: &Piece, _s: f64) {}
 
     /// Contribution to the film's input while `jet` arrives (y).
@@ -151,12 +151,12 @@ pub(crate) trait SensorPart: Debug + Send + Sync + BoxedSensor {
         to
     }
 
-    /// What the film gives at the end of a piece.
+    /// Output of the film at the end of a piece.
     fn advance(&mut self, piece: &Piece) -> f64 {
         self.jump(piece.to)
     }
 
-    /// What is read of the film's `signal`.
+    /// The reading for the film's `signal`.
     fn read(&self, signal: f64, _at: &Moment) -> f64 {
         signal
     }

@@ -31,13 +31,13 @@ pub enum PlantError {
 /// Everything that defines a rig.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlantSpec {
-    /// The flow to which the rest is added.
+    /// The flow to which the effects are added.
     pub base: BasePlant,
     /// The kind of flow.
     pub character: Character,
-    /// Effects, in any order; the physics orders them.
+    /// Effects, in any order; they act in physical order.
     pub effects: Vec<Effect>,
-    /// Effects in other laws than the catalogue's.
+    /// Effects with other equations than the catalogue's.
     pub altered: Vec<Altered>,
     /// Physics that the catalogue lacks.
     pub beyond: Vec<Beyond>,
@@ -58,7 +58,7 @@ impl PlantSpec {
         }
     }
 
-    /// The delay in force: an effect's, if one is about the delay, otherwise the base plant's.
+    /// The delay in force: a hidden effect's, if one is a delay law, otherwise the base plant's.
     pub fn delay(&self) -> FlowDelay {
         let parts = self.parts(&Surroundings::default()).into_iter();
         parts.fold(self.base.delay, |law, part| match part {
@@ -67,7 +67,7 @@ impl PlantSpec {
         })
     }
 
-    /// All parts in the order in which the signals run; within a place in the catalogue's.
+    /// All parts in the order of the signals; within a place in the catalogue's order.
     fn parts(&self, surroundings: &Surroundings<'_>) -> Vec<Part> {
         let effects = self
             .effects
@@ -87,8 +87,8 @@ impl PlantSpec {
     }
 }
 
-/// A rig at 20 kHz inside and 1 kHz outside, without noise. It starts separated, at rest, with a full
-/// plenum and a closed valve.
+/// A rig at 20 kHz inside and 1 kHz outside, without noise. It starts separated, at rest, with a full plenum and a
+/// closed valve.
 #[derive(Debug, Clone)]
 pub struct Rig {
     edges: Option<EdgeTravel>,
@@ -103,10 +103,10 @@ pub struct Rig {
 }
 
 impl Rig {
-    /// Builds the rig; `free_stream` is what the tunnel does during the record, steady when `None`.
+    /// Builds the rig; `free_stream` is the tunnel's velocity during the record, constant if `None`.
     ///
     /// # Errors
-    /// [`PlantError`] when the base plant or a parameter of an effect is physically impossible.
+    /// [`PlantError`] if the base plant or a parameter of an effect is physically impossible.
     pub fn new(spec: &PlantSpec, free_stream: Option<FreeStream>) -> Result<Self, PlantError> {
         spec.base.validate()?;
         spec.character.validate()?;
@@ -150,12 +150,12 @@ impl Rig {
         self.substeps as f64 * SUBSTEP_S
     }
 
-    /// The friction s of the flow now (y), before film and cable.
+    /// The present friction s of the flow (y), before film and cable.
     pub fn friction(&self) -> f64 {
         self.flow.friction()
     }
 
-    /// Tells the valve `level` (0 closed, 1 open) from now on.
+    /// Sets the valve's command to `level` (0 closed, 1 open) from now on.
     pub fn command(&mut self, level: f64) {
         self.command_at(self.time(), level);
     }
@@ -176,13 +176,13 @@ impl Rig {
         })
     }
 
-    /// Lets one sample period pass with the command held.
+    /// Advances by one sample period with a constant command.
     pub fn advance_sample(&mut self) {
         self.advance_sample_with(&[]);
     }
 
-    /// Lets one sample period pass in which the command changes at `(offset, level)`, offsets in
-    /// seconds from its beginning, ascending, within the period: edges need not fall on samples.
+    /// Advances by one sample period in which the command changes at `(offset, level)`. Offsets are in seconds from
+    /// its beginning, ascending, within the period: edges need not fall on samples.
     pub fn advance_sample_with(&mut self, changes: &[(f64, f64)]) {
         let begin = self.time();
         let mut changes = changes
@@ -208,7 +208,7 @@ impl Rig {
         }
     }
 
-    /// The flow and the film over one sub-step, split wherever an edge arrives.
+    /// Advances flow and film by one sub-step, split at every arriving edge.
     fn flow_substep(&mut self, start: f64, end: f64) {
         let (from, to) = self.clock.stretch(end, &self.mean);
         let (mut t, mut read) = (start, from);
@@ -224,7 +224,7 @@ impl Rig {
         }
         let last = self.jet.out.before(to, &mut self.cursor);
         area += self.piece(end - t, jet, last);
-        // An edge that arrives at this very instant already counts for a reading taken now.
+        // An edge that arrives at this instant already counts for the present reading.
         let now = self.jet.out.at(to, &mut self.cursor);
         self.arrive(now);
         self.mean.push(area, self.flow.friction());
@@ -244,8 +244,7 @@ impl Rig {
         self.sensor.jump(self.flow.at_the_film());
     }
 
-    /// Plays a command of one level per sample; the k-th reading is taken when the k-th level has just
-    /// been set.
+    /// Plays a command of one level per sample; the k-th reading is taken when the k-th level has just been set.
     pub fn play(&mut self, levels: &[f64]) -> Vec<f64> {
         levels
             .iter()
@@ -336,7 +335,7 @@ mod tests {
             },
             &[],
         );
-        // From rest the mean is 0: the first edge takes floor + rise.
+        // From rest the mean is 0: the delay of the first edge is floor + rise.
         rig.command(1.0);
         for _ in 0..42 {
             rig.advance_sample();
@@ -349,7 +348,7 @@ mod tests {
         rig.advance_sample();
         let expected = 1.0 - (-0.001_f64 / 0.04).exp();
         assert!((rig.friction() - expected).abs() < 1e-3 * expected + 2e-4);
-        // After long blowing the mean is 1: the falling edge takes floor + rise·exp(−rate).
+        // After long blowing the mean is 1: the delay of the falling edge is floor + rise·exp(−rate).
         for _ in 0..2000 {
             rig.advance_sample();
         }
@@ -403,7 +402,7 @@ mod tests {
 
     #[test]
     fn effects_add_up_in_the_physical_order() {
-        // A lagging valve, a drooping plenum and King's law at once, at steady blowing.
+        // A lagging valve, a drooping plenum and King's law together, under steady blowing.
         let (ratio, offset) = (1.5, 0.05);
         let effects = [
             HotFilmNonlinearity {
@@ -431,7 +430,7 @@ mod tests {
 
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(40))]
-        /// A later edge and a longer delay are the same thing, wherever between samples they fall.
+        /// A later edge is equivalent to a longer delay, at any position between samples.
         #[test]
         fn shifting_every_edge_is_the_same_as_a_longer_delay(
             dwells in prop::collection::vec(0.000_05_f64..0.030, 1..20),

@@ -7,9 +7,9 @@ use super::part::{Moment, Piece, SensorPart};
 #[derive(Debug, Clone)]
 pub(crate) struct Sensor {
     parts: Vec<Box<dyn SensorPart>>,
-    /// What goes into each part, and behind the last what comes out of it.
+    /// Input of each part, and output of the last one.
     signals: Vec<f64>,
-    /// Whether any part takes time; otherwise what is felt is worked out only when it is read.
+    /// Whether any part has dynamics; otherwise the output is computed only when it is read.
     takes_time: bool,
     freeze: Option<(f64, f64)>,
     last_reading: f64,
@@ -45,7 +45,7 @@ impl Sensor {
         }
     }
 
-    /// Lets `dt` pass while what the film feels goes in a straight line to `felt`.
+    /// Advances by `dt` while the film's input changes linearly to `felt`.
     pub(crate) fn advance(&mut self, dt: f64, felt: f64) {
         if self.takes_time {
             self.pass(felt, |part, from, to| part.advance(&Piece { dt, from, to }));
@@ -54,7 +54,7 @@ impl Sensor {
         }
     }
 
-    /// What the film feels jumps to `felt`.
+    /// The film's input jumps to `felt`.
     pub(crate) fn jump(&mut self, felt: f64) {
         if self.takes_time {
             self.pass(felt, |part, _, to| part.jump(to));
@@ -99,7 +99,7 @@ pub(crate) mod bench {
         sensor.read(&Moment { t, command })
     }
 
-    /// The first reading after the film has felt `s`.
+    /// The first reading after a film input of `s`.
     pub(crate) fn reading(sensor: &mut Sensor, s: f64) -> f64 {
         sensor.advance(5e-5, s);
         read(sensor, 0.0, 0.0)

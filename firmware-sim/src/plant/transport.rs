@@ -1,11 +1,11 @@
-//! From the jet's mouth to the sensor: delays that keep edges where they physically are.
+//! Transport from the jet's mouth to the sensor: delays that keep the exact times of edges.
 
 use std::collections::VecDeque;
 
 use super::SUBSTEP_S;
 use super::base::FlowDelay;
 
-/// Window of the mean friction that sets the state-dependent delay (s).
+/// Window of the mean friction that determines the state-dependent delay (s).
 pub(crate) const MEAN_WINDOW_S: f64 = 0.250;
 
 /// Sub-steps in the window.
@@ -13,7 +13,7 @@ const WINDOW: usize = 5000;
 
 /// Running mean of the friction over the last 250 ms, zero before the record.
 ///
-/// Kept as differences of the running integral, so that nothing drifts however long the plant runs.
+/// Stored as differences of the running integral, so that nothing drifts however long the plant runs.
 #[derive(Debug, Clone)]
 pub(crate) struct MeanFriction {
     /// (integral since the start, friction) at the last `WINDOW` + 1 sub-steps
@@ -27,14 +27,14 @@ impl MeanFriction {
         }
     }
 
-    /// Adds one sub-step: the area under the friction during it and the friction at its end.
+    /// Adds one sub-step: the integral of the friction over it, and the friction at its end.
     pub(crate) fn push(&mut self, area: f64, friction: f64) {
         let total = self.past.back().map_or(0.0, |b| b.0) + area;
         self.past.pop_front();
         self.past.push_back((total, friction));
     }
 
-    /// The mean now and its slope (1/s).
+    /// The present mean and its slope (1/s).
     pub(crate) fn mean_and_slope(&self) -> (f64, f64) {
         match (self.past.front(), self.past.back()) {
             (Some(old), Some(new)) => (
@@ -46,7 +46,7 @@ impl MeanFriction {
     }
 }
 
-/// Which moment of the jet reaches the sensor at a given time.
+/// The time at which the jet that arrives at the sensor now was emitted.
 #[derive(Debug, Clone)]
 pub(crate) struct ArrivalClock {
     law: FlowDelay,
@@ -66,15 +66,15 @@ impl ArrivalClock {
     /// The delay at mean friction `mean` (s).
     pub(crate) fn delay(&self, mean: f64) -> f64 {
         match self.law {
-            // The edges have been re-timed before they reached the valve.
+            // The times of the edges were changed before they reached the valve.
             FlowDelay::EdgeDependent { .. } => 0.0,
             law => law.at(mean),
         }
     }
 
-    /// The stretch of the jet's past that arrives during the sub-step ending at `end`.
+    /// The interval of the jet's past that arrives during the sub-step ending at `end`.
     ///
-    /// Each stretch begins exactly where the one before ended, so no edge is lost or counted twice.
+    /// Each interval begins exactly where the one before ended, so no edge is lost or counted twice.
     pub(crate) fn stretch(&mut self, end: f64, mean: &MeanFriction) -> (f64, f64) {
         let (now, slope) = mean.mean_and_slope();
         let from = self.read_from;
@@ -83,10 +83,10 @@ impl ArrivalClock {
     }
 }
 
-/// Re-times the edges of the command, when rising and falling ones travel differently.
+/// Changes the times of the command's edges, if rising and falling edges have different delays.
 ///
-/// An edge that would overtake earlier ones wipes them out: a pulse shorter than the difference of the
-/// two delays never arrives.
+/// An edge that would overtake earlier ones cancels them: a pulse shorter than the difference of the two delays
+/// never arrives.
 #[derive(Debug, Clone)]
 pub(crate) struct EdgeTravel {
     rise_s: f64,
@@ -97,7 +97,7 @@ pub(crate) struct EdgeTravel {
 }
 
 impl EdgeTravel {
-    /// `None` for the laws that delay the jet as a whole.
+    /// `None` for laws that delay the jet as a whole.
     pub(crate) fn new(law: FlowDelay) -> Option<Self> {
         match law {
             FlowDelay::EdgeDependent { rise_s, fall_s } => Some(Self {

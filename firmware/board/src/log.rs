@@ -1,7 +1,7 @@
 //! Output of `defmt` frames: to the probe (RTT) or to QEMU (semihosting).
 //!
-//! The usual transports panic on misuse, and panics must not be linked here. Nothing waits: a frame that does
-//! not fit is dropped as a whole.
+//! The usual transports panic on misuse, and panics must not be linked here. No call waits: a frame that does not
+//! fit is dropped as a whole.
 
 #[cfg(all(feature = "rtt", feature = "semihosting"))]
 compile_error!("logs go to one place: choose `rtt` or `semihosting`");

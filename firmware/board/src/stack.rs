@@ -1,10 +1,10 @@
-//! Measurement of the stack depth: the unused stack is painted at the start, and the overwritten part was
+//! Measurement of the stack depth: the unused stack is filled with a pattern at the start; overwritten words were
 //! used.
 
 use core::ptr::addr_of;
 
 const PAINT: u32 = 0xA5A5_5A5A;
-/// Left unpainted below the caller's frame, bytes.
+/// Bytes below the caller's frame without the pattern.
 const MARGIN: usize = 64;
 
 unsafe extern "C" {
@@ -13,20 +13,19 @@ unsafe extern "C" {
     static _stack_start: u32;
 }
 
-/// Paints the unused stack. Call it first in `main`.
+/// Fills the unused stack with the pattern. Call it first in `main`.
 #[inline(never)]
 pub fn paint() {
     let top = cortex_m::register::msp::read() as usize - MARGIN;
     let mut at = addr_of!(__sheap) as usize;
     while at < top {
-        // SAFETY: between the end of static memory and the stack in use nothing
-        // lives (there is no heap).
+        // SAFETY: there is no data between the end of static memory and the stack in use, because there is no heap.
         unsafe { (at as *mut u32).write_volatile(PAINT) };
         at += 4;
     }
 }
 
-/// The deepest the stack has been since it was painted, bytes.
+/// The largest depth of the stack since it was filled, bytes.
 #[must_use]
 pub fn deepest() -> u32 {
     let top = addr_of!(_stack_start) as usize;

@@ -1,9 +1,8 @@
-//! Constants that `host-fit codegen` wrote, a module for each model; `on_board` is
-//! the one that the boards run, and `rig` what they are connected to.
+//! Constants written by `host-fit codegen`, a module for each model. `on_board` is the model that the boards run,
+//! and `rig` the rig to which they are connected.
 //!
-//! Those in `generated/` are of the model files in `models/`: `cargo xtask
-//! identified` writes them anew, and CI compares. `cargo xtask firmware --model
-//! FILE` puts the constants of that model in their place for one build.
+//! The constants in `generated/` belong to the model files in `models/`: `cargo xtask identified` regenerates them,
+//! and CI compares. `cargo xtask firmware --model FILE` replaces them by the constants of that model for one build.
 #![no_std]
 #![forbid(unsafe_code)]
 

@@ -1,7 +1,7 @@
 //! The clock tree: 84 MHz from the ST-LINK's 8 MHz crystal.
 //!
-//! Written register by register: the HAL searches the divisors at run time and
-//! panics where it finds none, and a panic must not be linked here.
+//! Written register by register: the HAL searches the divisors at run time and panics if it finds none, and a panic
+//! must not be linked here.
 
 use stm32f4xx_hal::pac::{FLASH, RCC};
 

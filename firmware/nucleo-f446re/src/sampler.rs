@@ -1,6 +1,5 @@
-//! The sensor on PA0 and the measured channel on PA1: TIM2 starts a conversion of
-//! the one every sample period, the converter adds one of the other, and its
-//! interrupt puts the readings away and counts the period.
+//! The sensor on PA0 and the measured channel on PA1. TIM2 starts a conversion of the sensor every sample period,
+//! and the converter then converts the channel. Its interrupt stores the readings and counts the period.
 
 use crate::clocks::CORE;
 use core::sync::atomic::{AtomicU32, Ordering};
@@ -38,10 +37,9 @@ impl Sampler {
         converter
             .smpr2()
             .write(|w| w.smp0().cycles480().smp1().cycles480());
-        // One conversion of channel 0, which the resets of SQR1 to SQR3 say; after it
-        // by itself one of channel 1, the only one of the injected group. That group
-        // has a register of its own, so the two cannot be mixed up.
-        // SAFETY: a channel's number in a field for it.
+        // One conversion of channel 0, as after a reset of SQR1 to SQR3, followed automatically by one of channel
+        // 1, the only channel of the injected group. That group has its own data register, so the two cannot be
+        // confused. SAFETY: a channel number in its field.
         converter
             .jsqr()
             .write(|w| unsafe { w.jl().bits(0).jsq4().bits(1) });

@@ -1,4 +1,4 @@
-//! USART2 at 115 200 baud, 8N1: the serial port that the ST-LINK shows on USB.
+//! USART2 at 115 200 baud, 8N1: the serial port that the ST-LINK provides over USB.
 
 use crate::clocks::APB1;
 use core::cell::Cell;
@@ -22,7 +22,7 @@ const WAITING: usize = if firmware::on_board::PERIOD_US > 10_000 {
 /// The interrupt's end of the receive queue; handed over once.
 static RECEIVED: Mutex<Cell<Option<Producer<'static, u8>>>> = Mutex::new(Cell::new(None));
 
-/// The serial line. Nothing waits: bytes are sent one at a time by [`Uart::work`] when there is room.
+/// The serial line. No call waits: [`Uart::work`] sends one byte at a time if the line is free.
 pub struct Uart {
     registers: USART2,
     received: Option<Consumer<'static, u8>>,
@@ -90,7 +90,7 @@ fn USART2() {
         critical_section::with(|section| {
             let slot = RECEIVED.borrow(section);
             if let Some(mut producer) = slot.take() {
-                // A byte that does not fit is lost, and its command is not understood.
+                // A byte that does not fit is lost, and its command is then invalid.
                 let _ = producer.enqueue(byte);
                 slot.set(Some(producer));
             }

@@ -3,8 +3,7 @@
 use stm32f4xx_hal::gpio::{Output, PB10, PinState, PushPull};
 use stm32f4xx_hal::pac::GPIOB;
 
-/// High opens the valves. At reset the pin floats and the driver's pull-down
-/// keeps them shut.
+/// High opens the valves. At reset the pin floats, and the driver's pull-down keeps them closed.
 pub type Valve = PB10<Output<PushPull>>;
 
 /// Sets the pin low, then makes it an output.

@@ -37,8 +37,8 @@ impl Ticks {
         self.due = SYST::get_current();
     }
 
-    /// Waits for the next multiple of `period` ticks since the last wait ended, and returns the number of
-    /// periods: more than 1 if it was late.
+    /// Waits for the next multiple of `period` ticks since the last wait ended, and returns the number of periods:
+    /// more than 1 if the call was late.
     pub fn wait(&mut self, period: u32) -> u32 {
         let mut periods = 0;
         loop {

@@ -1,5 +1,5 @@
-//! CMSDK APB watchdog: restarts the board if it is not fed. Its first timeout is the board's non-maskable interrupt,
-//! which must restart the board; the second one would.
+//! CMSDK APB watchdog: restarts the board if it is not fed. Its first timeout raises the board's non-maskable
+//! interrupt, which must restart the board; a second timeout would restart it too.
 
 use core::mem::MaybeUninit;
 use core::ptr::{addr_of, addr_of_mut};
@@ -46,7 +46,7 @@ impl Watchdog {
 /// Whether the watchdog restarted the board; clears the mark.
 #[must_use]
 pub fn restarted() -> bool {
-    // SAFETY: the word is in RAM, any bits are a u32, and nothing runs beside.
+    // SAFETY: the word is in RAM, any bits are a valid u32, and nothing runs concurrently.
     let found = unsafe { addr_of!(MARK).cast::<u32>().read_volatile() };
     mark(0);
     found == RUNNING

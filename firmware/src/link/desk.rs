@@ -1,11 +1,10 @@
 //! The desk: the operator's lines and the host's frames on one serial line.
 //!
-//! A byte 0 begins frames; while they come, of the operator's lines only
-//! `disarm` counts, and it always does. When they have stopped for the link's
-//! time the line is the operator's again.
+//! A byte 0 begins a frame. While frames arrive, operator's lines are ignored except `disarm`, which always counts.
+//! After the link's timeout without frames, operator's lines are accepted again.
 //!
-//! The loop never waits for any of it: what is to be sent goes into an
-//! [`Outbox`], whole or not at all, and a sample that found no room is counted.
+//! The loop never waits for the line: output goes into an [`Outbox`], completely or not at all, and a sample that
+//! does not fit is counted.
 
 use crate::console::{Command, Console, Operator};
 use crate::controller::{Controller, Tick};
@@ -47,7 +46,7 @@ impl Desk {
         self.service.before(controller, outbox);
     }
 
-    /// After a sample: streams it, and checks whether the host is still there.
+    /// After a sample: streams it, and checks whether the host is still connected.
     pub fn after<L: Law>(
         &mut self,
         tick: &Tick,

@@ -1,8 +1,7 @@
 //! What the board does for a host: plays its commands, streams its samples.
 //!
-//! One host at a time has the board. What it has played ends when it has not
-//! been heard for the link's time: the valve shuts and [`Fault::Link`] stays.
-//! A law that it armed goes on; it needs no host.
+//! One host at a time controls the board. A command that it plays ends if no frame arrives for the link's timeout:
+//! the valve closes and [`Fault::Link`] is latched. A law that it armed continues without the host.
 
 use crate::controller::{Controller, Mode, Tick};
 use crate::fault::Fault;
@@ -56,7 +55,7 @@ pub struct Service {
     session: Option<Session>,
     player: Player,
     batch: Batch,
-    /// Samples for which the valve has been shut, saturating.
+    /// Samples for which the valve has been closed, saturating.
     shut: u32,
     damaged: u32,
 }
@@ -99,7 +98,7 @@ impl Service {
         }
     }
 
-    /// After a sample: streams it, and checks whether the host is still there.
+    /// After a sample: streams it, and checks whether the host is still connected.
     #[inline]
     pub fn after<L: Law>(
         &mut self,

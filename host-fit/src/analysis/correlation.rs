@@ -14,7 +14,7 @@ pub struct Correlation {
     pub outside: f64,
 }
 
-/// Largest number of samples used; more make no visible difference.
+/// Largest number of samples used; more samples do not change the picture visibly.
 const MOST_SAMPLES: usize = 100_000;
 /// Largest number of lags.
 const MOST_LAGS: usize = 250;

@@ -7,7 +7,7 @@ use crate::data::Record;
 use crate::linalg::Cholesky;
 use serde::Serialize;
 
-/// Delays that are tried first, beside those near a known dead time.
+/// Delays that are tried first, in addition to those near a known dead time.
 const DELAYS: usize = 24;
 
 /// An ARX(2,2) model: y_k = a₁·y_{k−1} + a₂·y_{k−2} + b₁·u_{k−nk} + b₂·u_{k−nk−1} + c.
@@ -29,7 +29,7 @@ fn logarithms(a: [f64; 2]) -> Option<[(f64, f64); 2]> {
     let inside = a1 * a1 / 4.0 + a2;
     if inside >= 0.0 {
         let root = inside.sqrt();
-        // The larger root first and the other from the product, so that neither loses digits.
+        // The larger root is computed first and the other from the product, so that neither loses digits.
         let large = a1 / 2.0 + root.copysign(if a1 == 0.0 { 1.0 } else { a1 });
         let small = if large == 0.0 { 0.0 } else { -a2 / large };
         let of = |pole: f64| {

@@ -10,9 +10,9 @@ const SHARE: f64 = 0.05;
 /// The longest such share.
 const LONGEST: f64 = 0.25;
 
-/// Free responses of a process to its initial state. The initial state is estimated from the start of the record: its
-/// first twentieth, at least 20 samples, and up to a quarter of the record where the shortest time constant is longer
-/// than half of that. In a record that begins in mid-run the estimate leaves out the first dead time, in which y answers
+/// Free responses of a process to its initial state. The initial state is estimated from the first twentieth of the
+/// record, at least 20 samples. If the shortest time constant is longer than half of that, up to a quarter of the
+/// record is used. In a record that begins in mid-run the first dead time is left out, because y then responds to
 /// commands that were not recorded.
 #[derive(Clone, Debug)]
 pub(super) struct InitialState {
@@ -31,7 +31,7 @@ pub(super) fn inner(a: &[f64], b: &[f64]) -> f64 {
 }
 
 impl InitialState {
-    /// Of free responses over a record of `samples`; `fastest` is the shortest time of the process, samples.
+    /// Builds them for a record of `samples`; `fastest` is the shortest time of the process, samples.
     pub(super) fn new(free: Vec<Vec<f64>>, samples: usize, fastest: f64) -> Self {
         Self::between(free, samples, fastest, 0..0)
     }
@@ -44,7 +44,7 @@ impl InitialState {
         known: Range<usize>,
     ) -> Self {
         let mut beginning = FEWEST.max((SHARE * samples as f64) as usize);
-        // Doubled, so that it does not vary with small changes of the time constant.
+        // Doubled, so that it does not change with small changes of the time constant.
         while (beginning as f64) < (LONGEST * samples as f64).min(2.0 * fastest) {
             beginning *= 2;
         }

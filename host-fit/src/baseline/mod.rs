@@ -20,7 +20,7 @@ use std::ops::Range;
 /// The shortest record that a baseline is fitted to, samples.
 const SHORTEST: usize = 8;
 
-/// Three linear models of the same records; `None` where there is none.
+/// Three linear models of the same records; `None` where one could not be fitted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Baselines {
     /// First order with dead time.
@@ -43,7 +43,7 @@ pub struct BaselineFits {
 }
 
 impl Baselines {
-    /// Fits all three to `learning`. All are none if u or y is constant, or no record has 8 samples.
+    /// Fits all three to `learning`. All are `None` if u or y is constant, or if no record has 8 samples.
     #[must_use]
     pub fn fit(learning: &[&Record]) -> Self {
         let long: Vec<&Record> = learning
@@ -71,8 +71,8 @@ impl Baselines {
         }
     }
 
-    /// FIT of each over the scored samples of `records` together, in percent. Samples before `scored.start` are run
-    /// and not scored. `None` where there is no baseline, a run does not stay finite, or the scored y never changes.
+    /// FIT of each over the scored samples of `records` together, in percent. Samples before `scored.start` are
+    /// simulated but not scored. `None` without a baseline, if a run is not finite, or if the scored y is constant.
     #[must_use]
     pub fn fit_percent(&self, records: &[(&Record, Range<usize>)]) -> BaselineFits {
         BaselineFits {

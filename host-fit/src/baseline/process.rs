@@ -12,7 +12,7 @@ use std::fmt;
 
 /// Time constants up to this many times the longest record.
 const SLOWEST: f64 = 30.0;
-/// Starts from which a descent is made.
+/// Starting points from which a descent is made.
 const DESCENTS: usize = 3;
 
 /// Time constants below this are not visible in a sampled response, samples.

@@ -1,4 +1,4 @@
-//! The best level and gain beside a given response: linear least squares (variable projection).
+//! The best level and gain for a given response: linear least squares (variable projection).
 
 use super::initial::{InitialState, inner};
 use super::response::Response;
@@ -93,7 +93,7 @@ impl Gram {
     }
 }
 
-/// Level and gain of a response over all of `series`, and the errors that are left where `errors` is given.
+/// Level and gain of a response over all of `series`, and the remaining errors if `errors` is given.
 pub(super) fn project(
     response: &Response,
     series: &[Series],

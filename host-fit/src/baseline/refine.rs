@@ -10,7 +10,7 @@ use crate::order;
 
 /// Most Gauss–Newton steps.
 const STEPS: usize = 20;
-/// A step that lowers the cost by less than this share is the last.
+/// The iteration ends after a step that lowers the cost by less than this share.
 const CONVERGED: f64 = 1e-7;
 /// Change of a logarithm for a difference quotient.
 const NUDGE: f64 = 1e-5;

@@ -1,7 +1,7 @@
-//! Step by step responses of a first and of a second order, exact for a command that is held between samples and
-//! for a dead time between two samples.
+//! Responses of a first and of a second order from sample to sample. They are exact for a command that is held
+//! between samples and for a dead time that is not a whole number of samples.
 
-/// Free responses below this share of their start have ended.
+/// Free responses below this share of their initial value have ended.
 const ENDED: f64 = 1e-9;
 
 /// A linear process of unit static gain, time in samples.
@@ -33,7 +33,7 @@ pub(super) struct Response {
     whole: usize,
 }
 
-/// State transition over `time` samples, and what a command of 1 adds in it.
+/// State transition over `time` samples, and the contribution of a command of 1 during it.
 fn transition(shape: Shape, time: f64) -> ([[f64; 2]; 2], [f64; 2]) {
     match shape {
         Shape::First { time_constant } => {
@@ -45,7 +45,8 @@ fn transition(shape: Shape, time: f64) -> ([[f64; 2]; 2], [f64; 2]) {
     }
 }
 
-/// The exponential of [[0, 1, 0], [−1, −2ζ, 1], [0, 0, 0]]·angle by its series, halved until that converges fast.
+/// The exponential of [[0, 1, 0], [−1, −2ζ, 1], [0, 0, 0]]·angle by its series; the angle is halved until the
+/// series converges fast.
 fn second_order(angle: f64, damping: f64) -> ([[f64; 2]; 2], [f64; 2]) {
     let size = angle * (1.0 + 2.0 * damping);
     let halvings = size.max(1e-3).log2().ceil().max(0.0) as i32 + 3;
@@ -79,7 +80,7 @@ fn product(a: &[[f64; 3]; 3], b: &[[f64; 3]; 3]) -> [[f64; 3]; 3] {
 }
 
 impl Response {
-    /// A process behind a dead time of `dead_time` samples, ≥ 0; 0 means that y_{k+1} answers u_k.
+    /// A process behind a dead time of `dead_time` samples, ≥ 0; 0 means that y_{k+1} responds to u_k.
     pub(super) fn new(shape: Shape, dead_time: f64) -> Self {
         let whole = dead_time.max(0.0).floor();
         let part = dead_time.max(0.0) - whole;
@@ -175,7 +176,7 @@ impl Shape {
         }
     }
 
-    /// Both time constants, the slow one first; `None` where the response swings.
+    /// Both time constants, the slow one first; `None` for an oscillating response.
     pub(super) fn time_constants(self) -> Option<[f64; 2]> {
         match self {
             Self::First { time_constant } => Some([time_constant, 0.0]),

@@ -27,7 +27,7 @@ fn mean_and_scale(values: impl Iterator<Item = f64> + Clone) -> Option<(f64, f64
     let mean = values.clone().map(|v| v / count).sum::<f64>();
     let variance = values.map(|v| (v - mean).powi(2) / count).sum::<f64>();
     let scale = variance.sqrt();
-    // Rounding errors of a constant are no variation.
+    // Rounding errors of a constant do not count as variation.
     (scale.is_finite() && scale > 1e-12 * mean.abs() && scale > 0.0).then_some((mean, scale))
 }
 
@@ -57,7 +57,7 @@ impl Scaling {
     }
 }
 
-/// The command before a record: what is stated, or its first value.
+/// The command before a record: the stated value, or its first value.
 pub(super) fn command_before(record: &Record) -> f64 {
     let first = record.u.first().copied().unwrap_or(0.0);
     record.u_before.unwrap_or(first)
@@ -68,7 +68,8 @@ impl Series {
         self.y.len()
     }
 
-    /// One sample of `factor`: u averaged over the time that it holds, y over as long around the instant.
+    /// One sample of `factor` original ones: u averaged over the time that it is held, y over an equally long
+    /// interval around the instant.
     pub(super) fn thinned(&self, factor: usize) -> Self {
         if factor <= 1 {
             return self.clone();

@@ -17,7 +17,7 @@ const DEAD_TIMES: usize = 150;
 const SCALE: usize = 4;
 /// The fewest thinned samples of the longest record.
 const SHORTEST: usize = 60;
-/// Time constants of a scan, thinned samples, and those that only the coarsest one tries beside them.
+/// Time constants of a scan, thinned samples, and further ones that only the coarsest scan tries.
 const TIMES: [f64; 5] = [0.5, 1.0, 2.0, 4.0, 8.0];
 const LONG_TIMES: [f64; 5] = [16.0, 32.0, 64.0, 128.0, 256.0];
 const DAMPINGS: [f64; 5] = [0.05, 0.2, 0.5, 1.0, 2.5];
@@ -120,7 +120,7 @@ fn scan(series: &[Series], shapes: &[Shape], limit: usize) -> Vec<(f64, Shape, u
 mod tests {
     use super::*;
 
-    /// A slow process with a long dead time in long records: some start is near it.
+    /// A slow process with a long dead time in long records: at least one starting point must be near it.
     #[test]
     fn a_scan_comes_near_on_the_scale_of_the_process() {
         for (slow, fast, dead) in [(900.0, 200.0, 333.0), (6.0, 2.0, 5.0)] {

@@ -1,4 +1,4 @@
-//! The baselines on simulated and, where they are there, on measured records.
+//! The baselines on simulated records and, where present, on measured ones.
 
 use super::*;
 use crate::data::{DataSet, Use};
@@ -37,7 +37,7 @@ fn command(samples: usize, mean_time: f64, noise: &mut Noise) -> Vec<f64> {
     u
 }
 
-/// Small Euler steps of two lags in a row behind a dead time of whole samples: a simulation of its own kind.
+/// Small Euler steps of two lags in series behind a dead time of whole samples, as an independent simulation.
 fn simulated(u: &[f64], slow: f64, fast: f64, dead: usize, level: f64, gain: f64) -> Vec<f64> {
     const STEPS: usize = 400;
     let (mut first, mut second) = (u[0], u[0]);
@@ -77,7 +77,7 @@ fn a_first_order_at_a_level_is_found_in_records_that_begin_in_mid_run() {
             let u = command(700, 60.0, &mut noise);
             let y = simulated(&u, 40.0, 1e-9, 15, 21.0, 30.0);
             let y: Vec<f64> = y.iter().map(|y| y + 0.1 * noise.normal()).collect();
-            // Cut in mid-run, but not where a command is still on its way.
+            // The records begin in mid-run, but not within a dead time after an edge.
             let steady = |k: &usize| (k - 16..*k).all(|i| u[i] == u[*k]);
             let from = (90..).find(steady).expect("a long on or off time");
             record(0.4, u, y).part(from, 700)
@@ -187,7 +187,7 @@ fn scale_level_and_clock_change_nothing_but_the_numbers() {
     near(other.gain, 2.5 / 3.0 * first.gain, 1e-3);
 }
 
-/// A record cut while a command is in the dead time: the stated command before the record is used, and the
+/// A record that begins within the dead time after an edge: the stated command before the record is used, and the
 /// lead is not scored.
 #[test]
 fn the_command_before_a_record_and_its_lead_are_used() {
@@ -271,7 +271,7 @@ fn strange_records_give_no_baseline_or_finite_ones() {
     }
 }
 
-/// A folder of records beside the project; `None`, and a line that says so, where it is not there.
+/// A folder of records outside the project; `None`, with a printed line, if it does not exist.
 fn beside(folder: &str) -> Option<PathBuf> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR"))
         .join("../../shared/data")
@@ -294,7 +294,7 @@ fn fits(learned: &[&Record], judged: &[&Record]) -> (Baselines, BaselineFits) {
     (found, fits)
 }
 
-/// The numbers of `strangers`, of least squares elsewhere.
+/// The numbers of `strangers`, computed elsewhere by least squares.
 #[test]
 fn records_of_strangers_have_the_published_fits() {
     let Some(folder) = beside("strangers") else {
@@ -350,8 +350,9 @@ fn arx_of_delay_one(train: &Record, test: &Record) -> Option<f64> {
     found.fit_percent(&[(test, 3..test.len())]).arx
 }
 
-/// The ARX table of the measured sets: free-run FIT on the test record, nk = 1. There the run begins with the first
-/// two measured samples, here with what fits the first twentieth; where poles are slow, that moves the FIT a little.
+/// The ARX table of the measured sets: free-run FIT on the test record, nk = 1. In the reference the run begins
+/// with the first two measured samples, here with a fit to the first twentieth. With slow poles this changes the
+/// FIT slightly.
 #[test]
 fn measured_records_have_the_published_arx_fits() {
     let Some(folder) = beside("real") else {

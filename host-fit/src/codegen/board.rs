@@ -7,10 +7,10 @@ use model_core::control::period::{LONGEST_US, SHORTEST_US, loop_period_us};
 use model_core::effect::RustType;
 use thiserror::Error;
 
-/// What the loop may take of a board's RAM, bytes. The firmware has the number,
-/// and a test across the crates holds both equal.
+/// RAM of a board that the loop may use, bytes. The firmware has the same number; a test across the crates compares
+/// them.
 pub const MOST: usize = 30 * 1024;
-/// What loop and law take however short a model's memory is, bytes.
+/// RAM of loop and law for a model with the shortest possible memory, bytes.
 const OVERHEAD: usize = 2 * 1024;
 
 /// Why a board cannot run a model.
@@ -19,14 +19,12 @@ const OVERHEAD: usize = 2 * 1024;
 pub enum BoardError {
     /// There is nothing to run.
     #[error(
-        "key `law`: the model has no law, and a board runs one. \
-         Run `host-fit design` on it and take the file that it writes."
+        "key `law`: the model has no law, which a board needs. Run `host-fit design` on it and use the file that it writes."
     )]
     NoLaw,
-    /// The jet blows at the lower command, and a board opens the valve with its output on.
+    /// The jet blows at the lower command, but a board opens the valve with its output on.
     #[error(
-        "key `command`: a full jet is the lower command ({full:?}, and {off:?} is none), and a board blows with its \
-         output on. Record u the other way round, 1 for a jet, and identify again."
+        "key `command`: a full jet is the lower command ({full:?}; {off:?} is no jet), but a board blows with its output on. Record u with 1 for a jet and 0 for none, and identify again."
     )]
     Inverted {
         /// The command of no jet.
@@ -36,14 +34,13 @@ pub enum BoardError {
     },
     /// More measured channels than converters.
     #[error(
-        "key `effect`: the model's effects need the measured channels {names}, and the board has one \
-         spare input (A1). Leave out an effect, or give the board one channel."
+        "key `effect`: the model's effects need the measured channels {names}, but the board has one spare input (A1). Leave out an effect, so that one channel remains."
     )]
     Channels {
         /// The channels.
         names: String,
     },
-    /// The timers do not go so fast or so slow.
+    /// The sample period is outside the range of the timers.
     #[error(
         "key `sample_period_s`: the board samples every {} to {} ms, not every {period} s. \
          Identify the model from records of another period.",
@@ -55,8 +52,7 @@ pub enum BoardError {
     },
     /// Too much to remember.
     #[error(
-        "key `{key}`: the model keeps {kept} samples for it, and with the law the loop takes \
-         {bytes} bytes of the {most} that fit the board. {remedy}"
+        "key `{key}`: the model stores {kept} samples for it. With the law the loop needs {bytes} bytes; the board has {most}. {remedy}"
     )]
     Memory {
         /// What most of it is for.
@@ -72,13 +68,13 @@ pub enum BoardError {
     },
 }
 
-/// A memory of a model: who needs it, its length in samples, its bytes.
+/// A memory of a model: its purpose, its length in samples, its bytes.
 type Part = (String, usize, usize, &'static str);
 
-/// Says whether the boards can run `model` with its law.
+/// Checks that the boards can run `model` with its law.
 ///
 /// # Errors
-/// The key of the model file that is at fault, and what to do.
+/// The key of the model file that causes the problem, and the remedy.
 pub fn check(model: &Model) -> Result<(), BoardError> {
     let Some(law) = &model.law else {
         return Err(BoardError::NoLaw);
@@ -114,13 +110,12 @@ pub fn check(model: &Model) -> Result<(), BoardError> {
     })
 }
 
-/// What the loop takes of a board's RAM with `model` and `law`, bytes; rather too
-/// much than too little.
+/// RAM of the loop with `model` and `law`, bytes; an upper estimate.
 #[must_use]
 pub fn loop_bytes(model: &Model, law: &Law) -> usize {
     let state: usize = parts(model).iter().map(|(_, _, bytes, _)| bytes).sum();
     let law = match law {
-        // Its own model, and the samples that it looks ahead.
+        // The law's own model, and its prediction horizon in samples.
         Law::Track(track) => state + 12 * usize::from(track.look_ahead),
         // The averaged readings.
         Law::Maximise(_) => 8 * model.averaging.window as usize,

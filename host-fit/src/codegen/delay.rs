@@ -1,4 +1,4 @@
-//! How the input delays of a model are written.
+//! Generated constants of the input delays of a model.
 
 use super::pieces::{count, lags, listed, with_units};
 use crate::model::{Delay, Model, TransportLaw};
@@ -13,13 +13,12 @@ pub(super) struct Written {
     pub(super) constants: TokenStream,
     /// The law, made of them.
     pub(super) value: TokenStream,
-    /// Whether `value` is a constant: some laws are computed where they are
-    /// used, for the sample period.
+    /// Whether `value` is a constant: some laws are computed at the place of use, for the sample period.
     pub(super) is_constant: bool,
     /// The longest delay of each input, samples.
     pub(super) longest: Vec<TokenStream>,
-    /// Longest time from a command to its first arrival, samples: the first input
-    /// to arrive is the one that counts.
+    /// Longest time from a command to its first arrival at the flow, samples; the input with the shortest delay
+    /// determines it.
     pub(super) first_arrival: TokenStream,
 }
 
@@ -83,7 +82,7 @@ fn of_law(model: &Model, law: &TransportLaw) -> Written {
             pub const DELAY_PARAMETERS: [f32; #length] = #values;
             /// Shortest and longest delay of the law, samples.
             pub const DELAY_RANGE: [f32; 2] = #range;
-            /// f_l, the delays of the inputs in units of the law's.
+            /// f_l, the delays of the inputs relative to the law's.
             pub const DELAY_FACTORS: [f32; #inputs] = #factors;
         },
         value: quote!(model_core::delay::ScaledDelay { law: #prepared, factors: DELAY_FACTORS }),
@@ -92,7 +91,7 @@ fn of_law(model: &Model, law: &TransportLaw) -> Written {
             .map(count)
             .map(|l| quote!((DELAY_FACTORS[#l] * DELAY_RANGE[1] + 0.5) as usize))
             .collect(),
-        // What is held back is in `opening` and `closing`.
+        // The delays of the edges are in `opening` and `closing`.
         first_arrival: quote! {
             (checks::smallest(&DELAY_FACTORS) * DELAY_RANGE[1] #rounding) as usize
         },

@@ -50,11 +50,11 @@ pub(super) fn sizes(model: &Model, memory: &Footprint) -> TokenStream {
         pub const SAMPLE_PERIOD_S: f32 = #period;
         /// W, samples.
         pub const WINDOW: u32 = #window;
-        /// Readings that are averaged before they are compared with the model.
+        /// Number of readings whose mean is compared with the model.
         pub const READINGS: usize = #readings;
-        /// Outputs kept: more than the longest lag, and no less than the averaging window.
+        /// Stored outputs: more than the longest lag, at least the averaging window.
         pub const OUTPUTS: usize = #outputs;
-        /// Jet strengths kept: more than the longest input delay.
+        /// Stored jet strengths: more than the longest input delay.
         pub const JETS: usize = #jets;
         /// Measured channels that the effects need, in the order in which they are passed.
         pub const CHANNELS: [&str; #channels] = [#(#names),*];
@@ -68,7 +68,7 @@ pub(super) fn sizes(model: &Model, memory: &Footprint) -> TokenStream {
     }
 }
 
-/// The range of the command, and what becomes of one: the other languages do the same at every step.
+/// The range of the command and its conversion; the other languages convert at every step.
 fn command(range: CommandRange) -> TokenStream {
     let (off, full) = (range.off, range.full);
     let (off_value, size) = (double(off), double(full - off));
@@ -78,12 +78,12 @@ fn command(range: CommandRange) -> TokenStream {
         quote!(((f64::from(command) - #off_value) / #size) as f32)
     };
     let doc = format!(
-        " The share of a full jet at a command in the unit of the records: {off:?} is no jet, {full:?} a full one."
+        " The command in the unit of the records as a fraction of a full jet: {off:?} is no jet, {full:?} a full jet."
     );
     quote! {
         #[doc = #doc]
         ///
-        /// `Identified` and its state take this share, not the command.
+        /// `Identified` and its state take this fraction, not the command.
         #[must_use]
         pub fn share(command: f32) -> f32 {
             #share
@@ -91,7 +91,7 @@ fn command(range: CommandRange) -> TokenStream {
     }
 }
 
-/// A number in double precision, in brackets where it is negative.
+/// A number in double precision, in parentheses if it is negative.
 fn double(value: f64) -> TokenStream {
     let size = Literal::f64_suffixed(value.abs());
     if value.is_sign_negative() {
@@ -131,7 +131,7 @@ pub(super) fn types(model: &Model, law: &Written) -> Result<TokenStream, Codegen
         #(#each)*
         /// The delay law.
         pub type Delay = #kind;
-        /// The effects, in the order of the physics.
+        /// The effects, in physical order.
         pub type Effects = #chain;
         #identified
         /// What the model remembers.
@@ -162,8 +162,7 @@ fn path(text: &str) -> Result<TokenStream, CodegenError> {
     })
 }
 
-/// Samples of memory of an effect that reaches back as long as the parameter
-/// with index `time` is.
+/// Samples of memory of an effect whose memory is as long as the parameter with index `time`.
 pub(super) fn buffer(model: &Model, added: &Added, time: usize) -> usize {
     let time = added.parameters.get(time).copied().unwrap_or(0.0) / model.sample_period_s;
     (time as usize).saturating_add(3).min(LONGEST_BUFFER)
@@ -212,7 +211,7 @@ pub(super) fn coefficients(model: &Model, law: &Written) -> TokenStream {
         pub const CONVENTION: LagConvention = #convention;
         /// The response to jets of part strength.
         pub const GRADING: Grading = #grading;
-        /// d, what drives the flow without jets.
+        /// d, the constant drive of the flow without jets.
         pub const CONSTANT: f32 = #constant;
         /// τ_i, samples.
         pub const STATE_LAGS: [u16; #one] = #state_lags;
@@ -232,7 +231,7 @@ pub(super) fn compile_time_checks(model: &Model, law: &Written) -> TokenStream {
     let columns = (0..model.b.len()).map(|l| effect(l, "C"));
     let (longest, first) = (&law.longest, &law.first_arrival);
     quote! {
-        /// Longest time from a command to its first arrival, samples.
+        /// Longest time from a command to its first arrival at the flow, samples.
         pub const FIRST_ARRIVAL: usize = #first;
 
         const _: () = {
@@ -242,19 +241,19 @@ pub(super) fn compile_time_checks(model: &Model, law: &Written) -> TokenStream {
             #(assert!(checks::finite(&#columns), "a coefficient c is not finite");)*
             assert!(
                 OUTPUTS >= checks::outputs_for(&STATE_LAGS, CONVENTION),
-                "a state lag reaches beyond the outputs kept"
+                "a state lag reaches beyond the stored outputs"
             );
             assert!(
                 OUTPUTS >= checks::outputs_for(&PRODUCT_LAGS, CONVENTION),
-                "a product lag reaches beyond the outputs kept"
+                "a product lag reaches beyond the stored outputs"
             );
             assert!(
                 OUTPUTS >= WINDOW as usize,
-                "the averaging window reaches beyond the outputs kept"
+                "the averaging window reaches beyond the stored outputs"
             );
             #(assert!(
                 JETS >= #longest + READINGS,
-                "an input delay reaches beyond the commands kept"
+                "an input delay reaches beyond the stored commands"
             );)*
         };
     }
@@ -362,7 +361,7 @@ fn prepared(model: &Model) -> TokenStream {
                 }
             },
         };
-        // A user's own effect brings its `new` with it.
+        // A user effect has its own `new`.
         let new = if model.definition(&added.name).is_some() {
             quote!(#kind::new)
         } else {
@@ -379,7 +378,7 @@ fn prepared(model: &Model) -> TokenStream {
     }
 }
 
-/// The user's own effects, written out: `model-core` does not have them.
+/// The user's own effects in full, because `model-core` does not contain them.
 pub(super) fn own_effects(model: &Model) -> Vec<TokenStream> {
     let own = model.effects.iter().filter_map(|added| {
         let definition = model.definition(&added.name)?;
@@ -392,7 +391,7 @@ pub(super) fn own_effects(model: &Model) -> Vec<TokenStream> {
     own.collect()
 }
 
-/// What a user's own effect is told.
+/// The arguments of a user effect.
 pub(super) fn setting(model: &Model, added: &Added) -> Setting<f32> {
     Setting {
         period: model.sample_period_s as f32,

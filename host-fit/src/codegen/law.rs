@@ -10,10 +10,10 @@ use model_core::control::{Pulses, Tracking, golden};
 use proc_macro2::{Literal, TokenStream};
 use quote::quote;
 
-/// Length of the law's golden run, samples: several delays, corrections at work.
+/// Length of the law's reference run, samples: several delays, with active corrections.
 const GOLDEN_SAMPLES: u32 = 4096;
 
-/// The law; a model without one says so by the same names.
+/// The law; a model without a law exports the same names.
 pub(super) fn items(model: &Model) -> Result<TokenStream, CodegenError> {
     let (law, expected) = match &model.law {
         None => (none(), 0),
@@ -30,7 +30,7 @@ pub(super) fn items(model: &Model) -> Result<TokenStream, CodegenError> {
     Ok(quote! {
         #law
 
-        /// What the law decides in its golden run, bit for bit, as the host computed it.
+        /// Decisions of the law in its reference run, bit for bit as computed on the host.
         pub const LAW_GOLDEN: GoldenLaw = GoldenLaw {
             samples: #samples,
             expected: #expected,
@@ -40,7 +40,7 @@ pub(super) fn items(model: &Model) -> Result<TokenStream, CodegenError> {
 
 fn none() -> TokenStream {
     quote! {
-        /// Samples that the law looks ahead at most.
+        /// Longest prediction horizon of the law, samples.
         pub const LOOK_AHEAD: usize = 1;
         /// The kind of law: none was designed.
         pub type Law = ();
@@ -97,9 +97,9 @@ fn tracking(law: &Track) -> TokenStream {
     ]
     .map(|value| number(value, ""));
     quote! {
-        /// Samples that the law looks ahead at most.
+        /// Longest prediction horizon of the law, samples.
         pub const LOOK_AHEAD: usize = #look_ahead;
-        /// The kind of law: it holds the friction at its reference.
+        /// The kind of law: it holds y at its reference.
         pub type Law = model_core::control::Tracking<f32>;
         /// The law.
         pub const LAW: Law = model_core::control::Tracking {
@@ -127,13 +127,13 @@ fn tracking(law: &Track) -> TokenStream {
             );
             assert!(
                 LOOK_AHEAD >= checks::look_ahead(&LAW, FIRST_ARRIVAL),
-                "the law looks ahead less far than delay, valve and half a hold time"
+                "the law's prediction horizon is shorter than delay, valve and half a hold time together"
             );
         };
     }
 }
 
-/// By the code that designs and simulates the law.
+/// Computed by the code that designs and simulates the law.
 fn golden_track(model: &Model, law: &Tracking<f32>) -> Result<u32, CodegenError> {
     let prepared = model.prepare::<f32>();
     let longest = u16::try_from(model.longest_delay()).unwrap_or(u16::MAX);
@@ -164,7 +164,7 @@ fn train(law: &Maximise) -> TokenStream {
     let (length, period) = (count(law.pulses.len()), Literal::u32_unsuffixed(law.period));
     let hold = hold(law.hold);
     quote! {
-        /// Samples that the law looks ahead at most.
+        /// Longest prediction horizon of the law, samples.
         pub const LOOK_AHEAD: usize = 1;
         /// The kind of law: pulses, (first sample, length) each, in a period that repeats.
         pub type Law = model_core::control::Pulses<[(u32, u32); #length]>;

@@ -1,20 +1,19 @@
 //! Rust constants for a board from an identified model.
 //!
-//! The text is the same bytes for the same model and compiles in a `no_std`
-//! crate that depends on `model-core` only. Numbers are the nearest `f32`,
-//! written as short as they can be read back. Whatever the model has, the file
-//! exports the same names, so that firmware compiles against any:
+//! The text is deterministic and compiles in a `no_std` crate that depends on `model-core` only. Numbers are the
+//! nearest `f32` in their shortest form. The file exports the same names for every model, so firmware compiles with
+//! any of them:
 //!
 //! | name | is |
 //! |---|---|
 //! | `Identified`, `model()` | the model |
-//! | `IdentifiedState`, `state(&model)` | what it remembers, at rest |
+//! | `IdentifiedState`, `state(&model)` | its state, at rest |
 //! | `Outputs`, `OUTPUTS`, `Jets`, `JETS` | its memories and their lengths, samples |
-//! | `CHANNELS`, `REFERENCES` | measured channels, and what they usually are |
-//! | `share(command)` | the share of a full jet, which the model takes, at a command of the records |
+//! | `CHANNELS`, `REFERENCES` | measured channels, and their usual values |
+//! | `share(command)` | the fraction of a full jet, the model's input, for a command of the records |
 //! | `SAMPLE_PERIOD_S`, `WINDOW`, `READINGS` | period, averaging window, readings to average |
 //! | `Law`, `LAW`, `LOOK_AHEAD` | the designed law; `()` for none |
-//! | `CHECKSUM`, `GOLDEN`, `LAW_GOLDEN` | what a board checks before it trusts them |
+//! | `CHECKSUM`, `GOLDEN`, `LAW_GOLDEN` | reference values that a board checks at start |
 
 pub mod board;
 mod delay;
@@ -32,7 +31,7 @@ use proc_macro2::{Literal, TokenStream};
 use quote::quote;
 use thiserror::Error;
 
-/// Expected values in the golden run.
+/// Expected values in the reference run.
 const GOLDEN_VALUES: usize = 32;
 
 /// Why no constants were generated.
@@ -41,7 +40,7 @@ const GOLDEN_VALUES: usize = 32;
 pub enum CodegenError {
     /// A number of the model is not finite in single precision.
     #[error(
-        "`{name}` is {value}, which single precision cannot hold. \
+        "`{name}` is {value}, which single precision cannot represent. \
          Identify the model again; scale the measured output if it is large."
     )]
     NotFinite {
@@ -59,7 +58,7 @@ pub enum CodegenError {
         /// Its name.
         name: String,
     },
-    /// An effect of the catalogue is written in Rust alone.
+    /// An effect of the catalogue that can be generated in Rust only.
     #[error(
         "effect `{name}` has no form in other languages than Rust. \
          Write it with `--lang rust`, or give it a form in host-fit/src/user_effect/forms.toml."
@@ -68,9 +67,9 @@ pub enum CodegenError {
         /// Its name.
         name: String,
     },
-    /// The model forgets faster than it can be tested or not at all.
+    /// The model decays too fast for the self-test, or not at all.
     #[error(
-        "the model's response to the golden run is not finite after {samples} samples: it is \
+        "the model's response to the reference command is not finite after {samples} samples: it is \
          unstable. Identify it again, with fewer lags or `--objective free-run`."
     )]
     Unstable {
@@ -113,11 +112,12 @@ pub fn generate(model: &Model) -> Result<String, CodegenError> {
     sections.extend(items::own_effects(model));
     let sections = sections.into_iter().map(text);
     let text = sections.collect::<Result<Vec<_>, _>>()?.join("\n");
-    // Names and notes of the model file stand in comments, where the compiler refuses what cannot be seen.
+    // Names and notes of the model file are written as comments, in which the compiler rejects invisible
+    // characters.
     Ok(visible(&text).into_owned())
 }
 
-/// In which language a model is written.
+/// The language of the generated code.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Language {
     /// Constants for `model-core`.
@@ -133,7 +133,7 @@ pub enum Language {
 /// `model`, its effects and its law in `language`.
 ///
 /// # Errors
-/// As [`generate`]; or an effect that is written in Rust alone.
+/// The errors of [`generate`]; or an effect that can be generated in Rust only.
 pub fn write(model: &Model, language: &Language) -> Result<String, CodegenError> {
     match language {
         Language::Rust => generate(model),
@@ -188,7 +188,7 @@ fn spec_of(model: &Model, added: &Added) -> Result<&'static Spec, CodegenError> 
 
 fn header(model: &Model) -> TokenStream {
     let lines = header_lines(model).into_iter().map(|text| {
-        // A line break would end what is a comment.
+        // A line break would end a comment.
         let text = text.replace(char::is_control, " ");
         let space = if text.is_empty() { "" } else { " " };
         format!("{space}{text}")
@@ -196,7 +196,7 @@ fn header(model: &Model) -> TokenStream {
     quote!(#(#![doc = #lines])*)
 }
 
-/// Where a model comes from, in lines.
+/// The origin of a model, in lines.
 fn header_lines(model: &Model) -> Vec<String> {
     let training = &model.training;
     let mut lines = Vec::new();
@@ -249,7 +249,7 @@ fn header_lines(model: &Model) -> Vec<String> {
     if !model.command.is_unit() {
         let range = model.command;
         line(format!(
-            "- command: {:?} is no jet, {:?} a full one; in Rust the model takes `share(command)`",
+            "- command: {:?} is no jet, {:?} a full one; in Rust the model's input is `share(command)`",
             range.off, range.full
         ));
     }
@@ -267,10 +267,10 @@ fn header_lines(model: &Model) -> Vec<String> {
     lines
 }
 
-/// Checksum and golden run, by the code that the host simulates with.
+/// Checksum and reference run, computed by the code of the host's simulation.
 fn golden(model: &Model, memory: &Footprint) -> Result<TokenStream, CodegenError> {
     let prepared = model.prepare::<f32>();
-    // Long enough for what is sent to arrive, twice over.
+    // Twice as long as the longest delay.
     let longest = model.longest_lag().max(model.longest_delay());
     let every = (2 * longest).div_ceil(GOLDEN_VALUES).clamp(32, 4096) as u32;
     let mut values = Vec::with_capacity(GOLDEN_VALUES);
@@ -296,7 +296,7 @@ fn golden(model: &Model, memory: &Footprint) -> Result<TokenStream, CodegenError
     Ok(quote! {
         /// CRC-32 of structure and coefficients, for the start-up self-test.
         pub const CHECKSUM: u32 = #checksum;
-        /// What the model says to the golden run, bit for bit, as the host computed it.
+        /// Outputs of the model in the reference run, bit for bit as computed on the host.
         pub const GOLDEN: Golden<#count> = Golden {
             every: #every,
             expected: [#(#values),*],

@@ -1,4 +1,4 @@
-//! Small pieces of Rust that several items are made of.
+//! Small pieces of Rust that several items use.
 
 use crate::user_effect::number;
 use model_core::effect::Spec;
@@ -22,7 +22,7 @@ pub(super) fn count(value: usize) -> Literal {
     Literal::usize_unsuffixed(value)
 }
 
-/// A word of 32 bits, as it would be compared.
+/// A word of 32 bits, in the form in which it is compared.
 pub(super) fn word(value: u32) -> Literal {
     let text = format!("0x{:04x}_{:04x}", value >> 16, value & 0xffff);
     text.parse()

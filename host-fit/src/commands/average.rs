@@ -9,8 +9,9 @@ use super::Console;
 
 /// Phase-average long raw recordings, in constant memory, into a data set with y_sd, y_min and y_max.
 ///
-/// Each RAW.csv (columns t,u,y and any channels; u is 0 or 1) becomes one record named by the file. Periods with
-/// missing or unreadable samples, or with another command than most, are dropped and counted.
+/// Each RAW.csv (columns t,u,y and any channels; u is 0 or 1) becomes one record named by the file. A period is
+/// dropped and counted if it has missing or unreadable samples, or if its command differs from that of most
+/// periods.
 ///
 /// Example: host-fit average raw.csv --period 10 --out set
 #[derive(Debug, clap::Args)]

@@ -14,8 +14,9 @@ use super::{Console, rig_constants};
 
 /// Write a model, its effects and its law as Rust constants, C, Python or MATLAB.
 ///
-/// Rust: constants for a no_std crate on model-core. C: C99 without a heap, `model_step` and `law_step`, bit for bit what
-/// the host computes. Python: classes `Model` and `Law` for NumPy. MATLAB: a function file that GNU Octave runs too.
+/// Rust: constants for a no_std crate on model-core. C: C99 without a heap, `model_step` and `law_step`,
+/// bit-identical to the host. Python: classes `Model` and `Law` for NumPy. MATLAB: a function file that GNU Octave
+/// runs too.
 ///
 /// Example: host-fit codegen model.toml --lang python -o flow.py
 #[derive(Debug, clap::Args)]
@@ -35,7 +36,7 @@ pub(crate) struct Args {
     /// channel, or too large.
     #[arg(long)]
     board: bool,
-    /// Rig file. A rig that contradicts the model is refused; its constants are written beside the output as
+    /// Rig file. A rig that contradicts the model is refused; its constants are written next to the output as
     /// `rig.rs`.
     #[arg(long, value_name = "rig.toml")]
     rig: Option<PathBuf>,
@@ -91,7 +92,8 @@ impl Args {
 pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
     let model = Model::load(&args.model)?;
     if args.board {
-        board::check(&model).with_context(|| format!("no board runs {}", args.model.display()))?;
+        board::check(&model)
+            .with_context(|| format!("a board cannot run {}", args.model.display()))?;
     }
     let rig = args.rig.as_deref().map(RigFile::load).transpose()?;
     if let (Some(rig), Some(file)) = (&rig, &args.rig) {
@@ -102,7 +104,7 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
     }
     let (output, language) = args.target();
     let constants = steps::written(&model, &language)
-        .with_context(|| format!("nothing written of {}", args.model.display()))?;
+        .with_context(|| format!("{} was not written", args.model.display()))?;
     if let Some(rig) = &rig {
         let text = rig_constants::rust(rig);
         let path = output.with_file_name("rig.rs");

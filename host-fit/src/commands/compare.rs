@@ -94,7 +94,7 @@ impl Args {
     }
 }
 
-/// Names of the files without ending; whole paths where two would be equal.
+/// Names of the files without ending; whole paths if two names would be equal.
 fn labels(paths: &[PathBuf]) -> Vec<String> {
     let stem = |path: &PathBuf| {
         path.file_stem()

@@ -50,7 +50,7 @@ macro_rules! bundled {
     };
 }
 
-/// The bundled files, so that the program shows them wherever it is.
+/// The bundled files, so that the program has them wherever it is installed.
 const FILES: [(&str, &str); 16] = [
     bundled!("ramp-cfd", "dataset.toml"),
     bundled!("ramp-cfd", "README.md"),
@@ -165,7 +165,7 @@ fn real_input(
     for ((kind, name, file), fit) in kinds.into_iter().zip(&mut fits) {
         let found = steps::identify(&set, &request(kind), &console.show_progress())?;
         found.model.save(&out.join(file))?;
-        // A law no better than a constant delay is not used.
+        // A law is used only if it is better than a constant delay.
         let is_constant = matches!(found.model.delay, Delay::Fixed { .. });
         let name = match (kind, is_constant) {
             (DelayKind::StateDependent, true) => "constant: no law is better",
@@ -329,7 +329,7 @@ fn hidden_plant() -> anyhow::Result<PlantSpec> {
 }
 
 /// Steady blowing, a plain relay and the designed law on the plant of the hidden set. The law runs in single
-/// precision, as on the board; the golden run in `identified.rs` comes from this code.
+/// precision, as on the board; the reference run in `identified.rs` comes from this code.
 fn the_loop(
     design: &Design,
     console: Console,

@@ -19,10 +19,12 @@ use crate::plants::Plants;
 
 /// Design an on/off law for the valve from a model and write it into the model file.
 ///
-/// `--goal track` holds y at `--target`; `--goal maximise` finds the pulses that give the highest mean y for the air. The
-/// law is then tried in the loop: on the model, and on every plant that is consistent with the records of DATASET (delay, gain and time constants at the ends of their intervals, each effect at the largest size that is not
-/// excluded). A law that loses attachment on one of these is refused, with the targets that pass. Stress beyond the
-/// records (every effect at its worst, wrong delays and gains, more noise, lost readings) is reported and never refuses a law.
+/// `--goal track` holds y at `--target`; `--goal maximise` finds the pulses with the highest mean y for a given
+/// price of air. The law is then tried in the loop: on the model, and on every plant that is consistent with the
+/// records of DATASET (delay, gain and time constants at the ends of their intervals, each effect at the largest
+/// size that is not excluded). A law that loses attachment on one of these is refused, with the targets that pass.
+/// Stress beyond the records (every effect at its worst, wrong delays and gains, more noise, lost readings) is
+/// reported and never refuses a law.
 ///
 /// Example: host-fit design model.toml DATASET --target 0.5 -o controlled.toml
 #[derive(Debug, clap::Args)]
@@ -75,8 +77,8 @@ pub(crate) struct Args {
     /// Rig file from `record --calibrate`: its sensor noise and its valve's shortest times are used.
     #[arg(long, value_name = "rig.toml")]
     rig: Option<PathBuf>,
-    /// Picture of the closed loop; by default beside the model file, ending in `-loop.svg`. The picture of
-    /// the robustness margin is written beside the model file, ending in `-margin.svg`.
+    /// Picture of the closed loop; by default next to the model file, ending in `-loop.svg`. The picture of the
+    /// robustness margin is written next to the model file, ending in `-margin.svg`.
     #[arg(long, value_name = "FILE.svg")]
     picture: Option<PathBuf>,
     /// The run on the model through a noisy sensor as CSV (t, reference, friction, y, u).
@@ -283,7 +285,7 @@ impl Args {
             }
             _ => Vec::new(),
         };
-        // A law that loses attachment on its own model has none.
+        // A law that loses attachment on its own model has no margin.
         let margin = proof
             .keeps_its_model()
             .then(|| steps::law_margin(&design, self.seed, true))
@@ -316,14 +318,14 @@ impl Args {
         self.force
     }
 
-    /// Where the picture of the loop goes.
+    /// Path of the picture of the loop.
     pub(super) fn picture(&self) -> PathBuf {
         self.picture
             .clone()
             .unwrap_or_else(|| self.beside("loop.svg"))
     }
 
-    /// A file beside the model file, its name that of the model with `-ending`.
+    /// A file next to the model file, with its name and `-ending`.
     fn beside(&self, ending: &str) -> PathBuf {
         let stem = self.output.file_stem().unwrap_or_default();
         let name = format!("{}-{ending}", stem.to_string_lossy());

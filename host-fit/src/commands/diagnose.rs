@@ -48,7 +48,7 @@ impl Args {
         }
     }
 
-    /// Makes the effects of the user's own known to `model`.
+    /// Makes the user's own effects known to `model`.
     pub(super) fn define(&self, model: &mut Model) -> anyhow::Result<()> {
         self.effect_files.define(model)
     }

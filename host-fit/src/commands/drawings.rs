@@ -166,7 +166,7 @@ pub(crate) fn margin_picture(margin: &Margin) -> String {
     })
 }
 
-/// Controllers beside each other on one flow.
+/// Several controllers on one flow.
 pub(crate) struct LoopPicture<'a> {
     pub(crate) title: &'a str,
     /// Whether the air used is shown.

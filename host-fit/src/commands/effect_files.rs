@@ -4,10 +4,10 @@ use host_fit::model::Model;
 use host_fit::user_effect::Definition;
 use std::path::PathBuf;
 
-/// Effect files that a command was given.
+/// Effect files given to a command.
 #[derive(Debug, Clone, Default, clap::Args)]
 pub(crate) struct EffectFiles {
-    /// File that defines an effect of your own, which then is like those of the catalogue; repeatable.
+    /// File that defines an effect of your own, which is then used like those of the catalogue; repeatable.
     #[arg(long, value_name = "FILE")]
     effect_file: Vec<PathBuf>,
 }

@@ -1,4 +1,5 @@
-//! Names of effects as arguments: a shell completes those of the catalogue, and any other may be an effect of the user's own.
+//! Names of effects as arguments. A shell completes those of the catalogue; other names may be effects of the
+//! user's own.
 
 use std::ffi::OsStr;
 

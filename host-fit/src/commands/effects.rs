@@ -9,8 +9,9 @@ use super::effect_names::EffectName;
 use super::words::{Words, effect_table};
 
 /// Base terms that are lags of the recursion and have no card in the catalogue.
-const FLOW_TERMS: &str = "flow-lag         flow   a second lag in series: T2·q̇ = u − q drives the recursion instead of u\n\
-                          flow-memory      flow   a later lag of y: adds a·y(t − T) to the recursion";
+const FLOW_TERMS: &str = "flow-lag         flow   a second lag in series: T2·q̇ = u − q replaces u in the \
+                          recursion\nflow-memory      flow   a later lag of y: a·y(t − T) is added to the \
+                          recursion";
 
 /// List the catalogue of effects, and the terms of base models.
 ///
@@ -27,7 +28,10 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
     let effects = catalogue();
     let Some(name) = &args.name else {
         console.say(&effect_table(&effects))?;
-        console.say("\nTerms of base models: `identify` adds them where they pay, `diagnose` never reports them as missing.")?;
+        console.say(
+            "\nTerms of base models: `identify` adds one if it lowers the validation error enough, \
+             `diagnose` never reports them as missing.",
+        )?;
         console.say(&effect_table(&base_terms()))?;
         console.say(FLOW_TERMS)?;
         return console.document(&effects);

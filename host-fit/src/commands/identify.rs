@@ -16,11 +16,12 @@ use super::load::shell_word;
 use super::time_span::{NotATime, TimeSpan};
 use super::{Console, check_outputs, page};
 
-/// Identify a model: structure chosen by validation error, or with the counts of lags that are given.
+/// Identify a model: structure chosen by validation error, or with given numbers of lags.
 ///
-/// With counts of lags, the delays are found by search (MADS) and the coefficients by least squares inside it.
+/// With given numbers of lags, the delays are found by search (MADS), and the coefficients by least squares within
+/// it.
 ///
-/// With the objective `free-run` the coefficients are refined on the free run afterwards, and kept if the validation
+/// With the objective `free-run` the coefficients are then refined on the free run, and kept if the validation
 /// error falls.
 ///
 /// Example: host-fit identify DATASET -o model.toml
@@ -42,24 +43,24 @@ pub(crate) struct Args {
 /// Options of an identification.
 #[derive(Debug, Clone, clap::Args)]
 struct Request {
-    /// Input delays: constant, eq. (3), or falling with the averaged output, eq. (4) [default: the one
-    /// with the lower validation error; fixed where counts of lags are given].
+    /// Input delays: constant, eq. (3), or falling with the averaged output, eq. (4) [default: the one with the
+    /// lower validation error; fixed if numbers of lags are given].
     #[arg(long, value_enum)]
     delay: Option<Delay>,
-    /// Interpolate delays between samples even where the validation error hardly falls; with an automatic structure.
+    /// Interpolate delays between samples even if the validation error hardly falls; with an automatic structure.
     #[arg(long)]
     interpolated: bool,
-    /// Law h = P0 + P1·exp(−P2·ỹ), in samples, in place of a measured one; implies `--delay state-dependent`.
+    /// Law h = P0 + P1·exp(−P2·ỹ), in samples, instead of a measured one; implies `--delay state-dependent`.
     #[arg(long, value_name = "P0,P1,P2", allow_hyphen_values = true)]
     delay_law: Option<LawArgument>,
-    /// Factors f of the delay law, one per input, in place of searching them.
+    /// Factors f of the delay law, one per input, instead of a search for them.
     #[arg(long, value_name = "F1,F2,…", value_delimiter = ',')]
     factors: Vec<f64>,
     /// Identify the model of the moving averages, eqs. (14) and (15).
     #[arg(long)]
     averaged: bool,
-    /// Number of state lags N1, or `auto`: the structure is chosen by validation error [default: auto where no count is
-    /// given; 5 beside other counts; averaged: 2].
+    /// Number of state lags N1, or `auto`: the structure is chosen by validation error [default: auto if no number
+    /// is given; 5 together with other numbers; averaged: 2].
     #[arg(long, value_name = "COUNT|auto")]
     n1: Option<Count>,
     /// Number of product lags N2 [default: 10; averaged: 2].
@@ -72,7 +73,7 @@ struct Request {
     /// the shortest record].
     #[arg(long, value_name = "SAMPLES|TIME", value_parser = longest_lag)]
     max_lag: Option<TimeSpan>,
-    /// What a lag τ means: y_{k−τ} as printed in eq. (3), or y_{k+1−τ}.
+    /// Meaning of a lag τ: y_{k−τ} as printed in eq. (3), or y_{k+1−τ}.
     #[arg(long, value_enum, default_value_t = Lags::OneStep)]
     lags: Lags,
     /// What the search minimises.
@@ -81,13 +82,13 @@ struct Request {
     /// Most evaluations of the objective.
     #[arg(long, value_name = "COUNT", default_value_t = 20_000, value_parser = clap::value_parser!(u64).range(1..))]
     evaluations: u64,
-    /// Threads; the result does not depend on it.
+    /// Number of threads; the result does not depend on it.
     #[arg(long, value_name = "COUNT", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=256))]
     threads: u16,
     /// Seed of every random choice.
     #[arg(long, default_value_t = 0)]
     seed: u64,
-    /// Physical effect to add once the base model is there; repeatable.
+    /// Physical effect to add to the base model; repeatable.
     #[arg(long, value_name = "NAME", value_parser = EffectName, hide_possible_values = true)]
     effect: Vec<String>,
     #[command(flatten)]
@@ -153,12 +154,12 @@ impl FromStr for LawArgument {
             {
                 Ok(Self(ExponentialDelay { floor, rise, rate }))
             }
-            _ => Err("three finite numbers with P0 and P0 + P1 not below 0 are needed, as in 47.35,12.69,20.18".to_owned()),
+            _ => Err("three finite numbers with P0 ≥ 0 and P0 + P1 ≥ 0 are needed, as in 47.35,12.69,20.18".to_owned()),
         }
     }
 }
 
-/// Lags that a search may have, samples.
+/// Allowed lags of a search, samples.
 const LAGS: RangeInclusive<u32> = 1..=20_000;
 
 fn longest_lag(text: &str) -> Result<TimeSpan, String> {

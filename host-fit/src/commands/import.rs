@@ -11,12 +11,12 @@ use super::average::positive;
 /// Convert logger files to a data set: CSV of any dialect, serial-monitor lines, MATLAB's .mat (v5 to v7), NumPy's .npy
 /// and .npz.
 ///
-/// Each FILE becomes one record named by the file; a folder stands for the files in it. Separators, decimal commas,
-/// thousands marks, lines before the header, dates and clock times, Unix times in s, ms or µs, on/off and true/false,
-/// percentages, and a command that is written on change only are recognised; what was understood is printed. A variable is
-/// named as its program would: valve, run.valve, data(:,2), data[:,1]. What is not named is found by its name (t, time or
-/// timestamp; u, input, heater, valve …; y, output, temperature …). y_sd, y_min, y_max and every other variable of the
-/// same length are kept. The mapping is kept in dataset.toml, for --like.
+/// Each FILE becomes one record named by the file; a folder stands for the files in it. Recognised are: separators,
+/// decimal commas, thousands marks, lines before the header, dates and clock times, Unix times in s, ms or µs,
+/// on/off and true/false, percentages, and a command that is written on change only. The interpretation is printed.
+/// A variable is named as in its program: valve, run.valve, data(:,2), data[:,1]. Variables without an option are
+/// found by their names (t, time or timestamp; u, input, heater, valve …; y, output, temperature …). y_sd, y_min,
+/// y_max and every other variable of the same length are kept. The mapping is stored in dataset.toml, for --like.
 ///
 /// Example: host-fit import log.csv -o set
 #[derive(Debug, clap::Args)]
@@ -39,7 +39,7 @@ pub(crate) struct Args {
     /// Seconds per unit of the time [default: from the header, otherwise 1].
     #[arg(long, value_name = "SECONDS", value_parser = positive)]
     t_scale: Option<f64>,
-    /// Sampling period, where the file has no time (or to check it).
+    /// Sampling period, if the file has no time (or to check it).
     #[arg(long, value_name = "SECONDS", value_parser = positive)]
     period: Option<f64>,
     /// Use --period as the spacing of the rows and ignore the file's time.
@@ -48,7 +48,7 @@ pub(crate) struct Args {
     /// Variable that is the command.
     #[arg(long, value_name = "NAME")]
     u: Option<String>,
-    /// u is this times the variable, plus --u-offset.
+    /// Scale of u: u is this times the variable, plus --u-offset.
     #[arg(long, value_name = "FACTOR", allow_negative_numbers = true)]
     u_scale: Option<f64>,
     /// Added to u.
@@ -69,10 +69,10 @@ pub(crate) struct Args {
     /// Added to y.
     #[arg(long, value_name = "VALUE", allow_negative_numbers = true)]
     y_offset: Option<f64>,
-    /// Keep this variable and no other beside t, u and y; repeatable.
+    /// Keep this variable and no other in addition to t, u and y; repeatable.
     #[arg(long, value_name = "NAME")]
     channel: Vec<String>,
-    /// Keep nothing beside t, u and y.
+    /// Keep only t, u and y.
     #[arg(long, conflicts_with = "channel")]
     no_channels: bool,
     /// Name of a file (without its ending) that becomes a validation record; repeatable.
@@ -91,7 +91,7 @@ pub(crate) struct Args {
 }
 
 impl Args {
-    /// The data set that the files make.
+    /// The data set made from the files.
     pub(super) fn import(&self) -> anyhow::Result<ImportedSet> {
         let files: Vec<&Path> = self.files.iter().map(PathBuf::as_path).collect();
         let request = Import {

@@ -1,4 +1,4 @@
-//! Ctrl-C: the first asks a command for the best it has, the second ends it.
+//! Ctrl-C: the first requests the best result so far from a command, the second ends it.
 
 use std::sync::Once;
 use std::sync::atomic::{AtomicBool, Ordering};

@@ -32,7 +32,7 @@ impl ModelAndData {
     }
 }
 
-/// A path as a shell takes it.
+/// A path as a shell accepts it.
 pub(crate) fn shell_word(path: &Path) -> String {
     super::page::quoted(&path.to_string_lossy())
 }

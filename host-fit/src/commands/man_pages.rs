@@ -1,4 +1,4 @@
-//! `man-pages`: a manual page for each command, which a release carries.
+//! `man-pages`: a manual page for each command, as part of a release.
 
 use std::path::{Path, PathBuf};
 

@@ -1,5 +1,6 @@
-//! The commands of the program, one file each: they parse, call [`host_fit::steps`] and hand the result to one of three
-//! renderers: [`words`], [`page`] with its [`drawings`], and JSON, which is the result itself ([`Console::show`]).
+//! The commands of the program, one file each. They parse, call [`host_fit::steps`] and pass the result to one of
+//! three renderers: [`words`], [`page`] with its [`drawings`], and JSON, which is the serialised result
+//! ([`Console::show`]).
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -49,7 +50,7 @@ pub(crate) mod watch;
 mod words;
 pub(crate) mod workbench;
 
-/// How a command talks to the user.
+/// Output of a command to the user.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Console {
     /// Standard output carries one JSON document and nothing else.
@@ -57,7 +58,7 @@ pub(crate) struct Console {
 }
 
 impl Console {
-    /// Prints a result: in words with the files that were `written`, or as the one JSON document, which names the
+    /// Prints a result: in words, with the files that were `written`, or as the one JSON document, which names the
     /// files of `keys` before the result's own keys.
     pub(crate) fn show<T: Words + Serialize>(
         self,
@@ -67,7 +68,7 @@ impl Console {
     ) -> anyhow::Result<()> {
         #[derive(Serialize)]
         struct Document<'a, T> {
-            /// As text: JSON strings must be UTF-8, and a file is not refused for its name.
+            /// As text: JSON strings must be UTF-8, but no file is refused because of its name.
             #[serde(flatten)]
             files: BTreeMap<&'a str, Cow<'a, str>>,
             #[serde(flatten)]
@@ -104,7 +105,7 @@ impl Console {
         write_out(&visible_json(&document))
     }
 
-    /// A progress bar on standard error; invisible when that is no terminal.
+    /// A progress bar on standard error; invisible if that is not a terminal.
     #[allow(clippy::unused_self)]
     pub(crate) fn progress(self, length: u64, template: &str) -> ProgressBar {
         if !io::stderr().is_terminal() {
@@ -163,8 +164,8 @@ impl Onlooker for Watch {
         ));
     }
 
-    /// A warning goes to standard error where that is a terminal, otherwise among the words of the result; with
-    /// `--json` the document carries it.
+    /// A warning goes to standard error if that is a terminal, otherwise to the words of the result; with `--json`
+    /// the document contains it.
     fn hears(&self, warning: &str) {
         let text = format!("warning: {}", visible(warning));
         if io::stderr().is_terminal() {
@@ -197,7 +198,7 @@ pub(crate) fn paragraph(error: &anyhow::Error) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
-/// Refuses outputs that cannot be written, before the work and not after it.
+/// Refuses outputs that cannot be written before the work starts.
 pub(crate) fn check_outputs<'a>(
     files: impl IntoIterator<Item = &'a PathBuf>,
 ) -> anyhow::Result<()> {
@@ -205,12 +206,12 @@ pub(crate) fn check_outputs<'a>(
     Ok(files.try_for_each(|file| check_writable(file))?)
 }
 
-/// Prints a text and a line end, with control characters escaped: names in it come from files.
+/// Prints a text and a line end, with control characters escaped, because names in it come from files.
 fn print(text: &str) -> anyhow::Result<()> {
     write_out(&visible(text))
 }
 
-/// Writes a text and a line end; a closed pipe (`| head`) is no error.
+/// Writes a text and a line end; a closed pipe (`| head`) is not an error.
 fn write_out(text: &str) -> anyhow::Result<()> {
     let mut out = io::stdout().lock();
     match writeln!(out, "{text}").and_then(|()| out.flush()) {

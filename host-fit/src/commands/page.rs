@@ -47,7 +47,7 @@ pub(crate) fn comparison(
     report.html()
 }
 
-/// The page of several models beside the same records.
+/// The page of several models on the same records.
 pub(crate) fn side_by_side(
     models: &[(String, &Model)],
     set: &DataSet,
@@ -67,7 +67,7 @@ pub(crate) fn side_by_side(
     let [first, rest @ ..] = SIDE_BY_SIDE;
     let columns = std::iter::once(Column::Text(first)).chain(rest.map(Column::Number));
     report.table(
-        "Free run against the measurement; RMSE and noise of the validation records where there are any.",
+        "Free run against the measurement. RMSE and noise are those of the validation records, if there are any.",
         &columns.collect::<Vec<_>>(),
         &side_by_side_rows(found),
     );
@@ -120,7 +120,7 @@ pub(crate) fn identification(set: &DataSet, found: &Identification, run: &Compar
     report.html()
 }
 
-/// The page of a model before and after effects were added; `before` is missing where its free run diverges.
+/// The page of a model before and after effects were added; `before` is `None` if its free run diverges.
 pub(crate) fn extension(
     set: &DataSet,
     found: &Extension,
@@ -196,7 +196,7 @@ pub(crate) fn finding_lead(
 fn after_label(found: &Finding) -> &'static str {
     match found.diagnosis.missing.is_empty() {
         true => "as diagnosed",
-        false => "with what was missing",
+        false => "with the effects",
     }
 }
 
@@ -244,7 +244,7 @@ pub(crate) fn finding_details(
     report_scores(report, &found.scores);
 }
 
-/// The page of a discovery beside `given`.
+/// The page of a discovery for `given`.
 pub(crate) fn discovery(given: &Model, set: &DataSet, found: &Terms, command: &str) -> String {
     let mut report = Report::new("Discovery", title(set));
     let records = given.targets(&set.records);
@@ -364,10 +364,13 @@ pub(super) fn law(model: &Model, tried: &Tried, tracks: bool, command: &str) -> 
         report.section("Robustness margin");
         report.figure(
             &margin_picture(margin),
-            "Inside each contour attachment is kept and the rms error stays within twice that on the model.",
+            "Inside each contour attachment is kept, and the rms error is at most twice that on the model.",
         );
         report.paragraph(&margin.words());
-        report.paragraph("The region comes from seeded simulations, not from a Lyapunov function: it is no proof of stability.");
+        report.paragraph(
+            "The region was found by simulations with fixed seeds, not with a Lyapunov function; \
+             it does not prove stability.",
+        );
     }
     report.section("Every trial");
     report.code(&tried.proof.words());
@@ -391,8 +394,9 @@ fn report_trace(report: &mut Report, trace: &Trace) {
     };
     report.section("Trace of the unexplained error");
     report.paragraph(&format!(
-        "The signal at the {} that would explain the error of the base model, whatever it depends on. Compare it with other \
-         measurements of that day; `--trace trace.csv` writes it for every place.",
+        "The signal at the {} that would explain the error of the base model. It assumes no coordinate. \
+         Compare it with other signals measured on the same day; `--trace trace.csv` writes it for every \
+         place.",
         entry.place().word()
     ));
     for record in trace.records.iter().rev().take(TRACED_RECORDS) {
@@ -440,7 +444,7 @@ pub(super) fn term_picture(term: &FoundTerm) -> String {
     curve(&CurvePlot {
         title: "",
         x_label: &format!("{} ({})", term.coordinate, term.coordinate_unit),
-        // Shortened, since the heading has the full name and the axis is short.
+        // Shortened, because the heading has the full name and the axis is short.
         y_label: &format!(
             "{} ({})",
             term.changes.split(" of ").next().unwrap_or_default(),
@@ -519,8 +523,7 @@ pub(crate) fn report_climb(
     report.living(&living);
 }
 
-/// Largest number of intermediate steps on a page: it must stay below 5 MB and with six distinguishable
-/// lines.
+/// Largest number of intermediate steps on a page: at most 5 MB, and six distinguishable lines.
 fn most_steps(records: &[Record]) -> usize {
     const SAMPLES: usize = 320_000;
     let samples: usize = records.iter().map(Record::len).sum();
@@ -547,8 +550,8 @@ pub(super) fn living(
 /// The indicators as a table of a report.
 pub(crate) fn report_scores(report: &mut Report, scores: &Scores) {
     report.table(
-        "Free run against the measurement. FIT, ρ and ε are eqs. (10), (11) and (9) of the paper; noise is the \
-         standard error of the measurement, inside the share of samples within its envelope.",
+        "Free run against the measurement. FIT, ρ and ε are eqs. (10), (11) and (9) of the paper. Noise is the \
+         standard error of the measurement. Inside is the share of samples within the measurement's envelope.",
         &[
             Column::Text("record"),
             Column::Text("use"),
@@ -592,7 +595,7 @@ fn report_candidates(report: &mut Report, found: &Finding) {
         report.section("Candidates");
         report.figure(
             &ranking_picture(diagnosis),
-            "Each effect alone, refitted with everything else.",
+            "Each effect alone, refitted together with all other parameters.",
         );
         report.table(
             "Nats: ln of the Bayes factor of the model with the effect against the model without it. p is family-wise: \
@@ -609,7 +612,7 @@ fn report_candidates(report: &mut Report, found: &Finding) {
         );
     }
     if !found.detectable.is_empty() {
-        report.section("What would have been found");
+        report.section("Detectable effects");
         let lines: Vec<&str> = found.detectable.iter().map(|d| d.words.as_str()).collect();
         report.list(&lines);
     }
@@ -677,7 +680,7 @@ pub(super) fn command_line() -> String {
     all.join(" ")
 }
 
-/// A word of a command, as a shell takes it.
+/// A word of a command, as a shell accepts it.
 pub(super) fn quoted(word: &str) -> String {
     let plain = |c: char| c.is_alphanumeric() || "-_=./,:+".contains(c);
     match !word.is_empty() && word.chars().all(plain) {

@@ -178,7 +178,8 @@ pub(crate) fn checks(report: &mut Report, records: &[Record], runs: &[Run<'_>]) 
             log_x: false,
         }),
         &format!(
-            "A white residual stays in the band at 95 % of the lags; coloured measurement noise leaves it as well. Outside: {}.",
+            "95 % of the lags of a white residual lie within the band; coloured measurement noise exceeds it \
+                 as well. Outside: {}.",
             outside(&|i| tested[i].0.outside)
         ),
     );
@@ -240,7 +241,7 @@ fn spectra(report: &mut Report, runs: &[Run<'_>], residuals: &[Residuals]) {
     }];
     if let Some(noise) = &noise {
         drawn.push(Line {
-            label: "noise of y_sd, if white",
+            label: "noise of `y_sd`, if white",
             points: noise,
             colour: None,
             dashed: true,
@@ -263,7 +264,7 @@ fn spectra(report: &mut Report, runs: &[Run<'_>], residuals: &[Residuals]) {
             band: None,
             log_x: true,
         }),
-        "Welch's estimate. Where the residual stands above the noise, the model lacks dynamics at that frequency.",
+        "Welch's estimate. If the residual exceeds the noise at a frequency, the model lacks dynamics there.",
     );
 }
 
@@ -305,8 +306,8 @@ fn responses(report: &mut Report, runs: &[Run<'_>]) {
             band: None,
             log_x: false,
         }),
-        "The command opens from rest (0 → 1), and closes from the steady state (1 → 0, sign reversed). The two differ as far \
-         as the plant is not linear.",
+        "The command opens from rest (0 → 1), and closes from the steady state (1 → 0, sign reversed). For a \
+         linear plant the two responses are equal.",
     );
 }
 
@@ -338,7 +339,7 @@ fn pole_table(report: &mut Report, runs: &[Run<'_>]) {
     }
     report.subsection("Poles");
     report.table(
-        "The slowest poles of the recursion with a constant command, effects left out; one of each conjugate pair.",
+        "The slowest poles of the recursion with a constant command, without effects; one of each conjugate pair.",
         &[
             Column::Text("model"),
             Column::Text("command"),

@@ -66,7 +66,7 @@ fn said(text: &str) -> Result<ChannelSaid, String> {
     let parts: Vec<&str> = text.split(',').map(str::trim).collect();
     let number = |text: &str| {
         text.parse::<f64>()
-            .map_err(|_| format!("`{text}` is no number"))
+            .map_err(|_| format!("`{text}` is not a number"))
     };
     match parts[..] {
         [name, unit, zero, per_count] => Ok(ChannelSaid {
@@ -75,7 +75,7 @@ fn said(text: &str) -> Result<ChannelSaid, String> {
             zero_counts: number(zero)?,
             per_count: number(per_count)?,
         }),
-        _ => Err("it has four parts: u_inf,m/s,0,0.005".into()),
+        _ => Err("four parts are needed, as in u_inf,m/s,0,0.005".into()),
     }
 }
 
@@ -97,7 +97,8 @@ impl Words for Recorded {
             );
             if r.lost_samples > 0 {
                 text.push_str(&format!(
-                    "; {} samples were lost ({} of them for lack of memory on the board); their repeats were played again",
+                    "; {} samples were lost ({} of them because the board's memory was full); their repeats \
+                         were played again",
                     r.lost_samples, r.left_out_samples
                 ));
             }
@@ -157,7 +158,7 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
         .find(|(i, c)| commands[..*i].iter().any(|o| o.name == c.name));
     if let Some((_, command)) = twice {
         bail!(
-            "two commands are named `{}`, and so would be their recordings; rename a file",
+            "two commands are named `{}`, and their recordings would have the same name; rename a file",
             command.name
         );
     }
@@ -238,7 +239,7 @@ fn calibrate(
         &mut |what, now| {
             bar.set_message(format!("{what}: {} counts", now.newest.counts));
             if interrupt.load(std::sync::atomic::Ordering::Relaxed) {
-                // The board closes the valve by itself when its host is silent.
+                // The board closes the valve by itself if its host is silent.
                 std::process::exit(130);
             }
         },

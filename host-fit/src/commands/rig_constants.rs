@@ -1,4 +1,4 @@
-//! A rig's constants for the firmware, and whether they fit a model.
+//! A rig's constants for the firmware, and a check that they fit a model.
 
 use host_fit::model::{Law, Model};
 use rig_line::RigFile;

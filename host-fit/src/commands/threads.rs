@@ -1,4 +1,4 @@
-//! Checks whether the machine provides threads, before libraries that would abort without them are used.
+//! Checks whether the machine provides threads, before libraries are used that abort without them.
 
 use std::sync::OnceLock;
 use std::sync::mpsc::channel;
@@ -34,7 +34,7 @@ pub(crate) fn are_given() -> bool {
 pub(crate) fn or_one() {
     if !are_given() {
         let one = rayon::ThreadPoolBuilder::new().num_threads(1);
-        // Fails only if a pool exists already; this is the first.
+        // Fails only if a pool exists already; this is the first one.
         let _ = one.use_current_thread().build_global();
     }
 }
@@ -47,7 +47,8 @@ pub(crate) fn needed(what: &str) -> anyhow::Result<()> {
     match are_given() {
         true => Ok(()),
         false => anyhow::bail!(
-            "{what} needs threads and the system gives none; raise the limit of processes (`ulimit -u`) or end others"
+            "{what} needs threads, but the system provides none; raise the limit of processes (`ulimit -u`) or \
+                 end other programs"
         ),
     }
 }

@@ -56,7 +56,8 @@ impl TimeSpan {
         }
         let (least, most) = (*range.start(), *range.end());
         anyhow::bail!(
-            "{option} {self} is {samples} samples of {period_s} s; give {least} to {most} samples ({:.6}s to {:.6}s)",
+            "{option} {self} corresponds to {samples} samples of {period_s} s; give {least} to {most} samples \
+                 ({:.6}s to {:.6}s)",
             f64::from(least) * period_s,
             f64::from(most) * period_s
         )
@@ -75,7 +76,7 @@ impl fmt::Display for TimeSpan {
 /// A text that is not a time.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error(
-    "`{0}` is no time: give samples as a whole number (300), or a time with its unit (0.3s, 300ms, 5min)"
+    "`{0}` is not a time: give samples as a whole number (300), or a time with its unit (0.3s, 300ms, 5min)"
 )]
 pub(crate) struct NotATime(String);
 

@@ -1,5 +1,5 @@
-//! The first sample of each record that a delay study uses: as the preparation determined, and not before the
-//! response to commands of the record.
+//! The first sample of each record that a delay study uses. The preparation determines it; it does not lie before
+//! the response to the record's own commands.
 
 use crate::data::{DataSet, Record, Use};
 use crate::preparation::Preparation;

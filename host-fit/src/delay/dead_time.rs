@@ -1,15 +1,15 @@
 //! The dead time of one linear plant with an interval that covers the choice of its order.
 //!
-//! A dead time and a second time constant look much alike: h falls by about T₂ when T₂ is allowed. So h is not taken
-//! from the best order but averaged over all of them. For each ratio b of a grid around the best, and for the first
-//! order (b = 0), the fit over h and S gives a normal law of h, its weight
+//! A dead time and a second time constant have similar effects: h falls by about T₂ when T₂ is allowed. Therefore h
+//! is not that of the best order but an average over all orders. For each ratio b of a grid around the best, and
+//! for the first order (b = 0), the fit over h and S gives a normal distribution of h with the weight
 //!
 //!    w_b ∝ prior(b)·√det Cov(h, ln S)·exp(−RSS_b / 2σ²ν)
 //!
-//! with σ² the residual variance and ν its widening through autocorrelation, (1 + ρ)/(1 − ρ). A third lag is taken from h
-//! in the same way, so it is one more order: for some T₃ in proportion to S, with b and its covariance integrated, too.
-//! One half of the prior is the first order's, a quarter each the second's and the third's. The interval is that of the
-//! mixture, its ends at 2.5 and 97.5 %.
+//! with σ² the residual variance and ν its inflation by autocorrelation, (1 + ρ)/(1 − ρ). A third lag also shortens
+//! h, so it is one more order: T₃ takes some values in proportion to S, and b and its covariance are integrated
+//! too. The prior is one half for the first order and a quarter each for the second and the third. The interval is
+//! that of the mixture, from 2.5 to 97.5 %.
 
 use super::linear::{Evaluation, Free, Refined, Series, refine};
 use super::plant::Plant;
@@ -32,7 +32,7 @@ pub struct DeadTime {
 }
 
 impl DeadTime {
-    /// Mean of several edges; `common` is the error that they share: order, settings and clock.
+    /// Mean of several edges; `common` is the error that all edges share: order, settings and clock.
     pub(crate) fn of_edges(edges: &[(f64, f64)], common: f64) -> Option<Self> {
         let n = edges.len();
         if n == 0 {
@@ -78,7 +78,7 @@ struct Component {
     sd: f64,
 }
 
-/// The variance of the residual, widened for its autocorrelation.
+/// The variance of the residual, inflated for its autocorrelation.
 pub(crate) fn widened_variance(at: &Evaluation) -> f64 {
     let samples: usize = at.residuals.iter().map(Vec::len).sum();
     let free = samples.saturating_sub(3 + 3 * at.residuals.len()).max(1) as f64;
@@ -134,7 +134,7 @@ fn with_third(series: &[Series], second: Plant, free: Free, max_delay: f64) -> V
     let mut at = second;
     let fit = |share: f64| {
         let third = share * second.mean_sum();
-        // It is taken from the dead time and from the sum.
+        // The third lag is subtracted from the dead time and from the sum.
         let more = third - at.third;
         let from = Plant {
             delay: at.delay.map(|h| (h - more / 2.0).max(0.0)),
@@ -146,7 +146,7 @@ fn with_third(series: &[Series], second: Plant, free: Free, max_delay: f64) -> V
         at = fit.at.plant;
         Some(fit)
     };
-    // Far below a sample it is no lag.
+    // A lag far below a sample has no effect.
     let shares = THIRDS.into_iter();
     shares
         .filter(|share| share * second.mean_sum() >= 0.5)
@@ -154,8 +154,8 @@ fn with_third(series: &[Series], second: Plant, free: Free, max_delay: f64) -> V
         .collect()
 }
 
-/// The dead time over all orders, from the fits of [`super::linear::fit`], and the place of the fit whose order is chosen. `clock`
-/// is the standard error of the clock, samples.
+/// The dead time over all orders, from the fits of [`super::linear::fit`], and the index of the fit whose order is
+/// chosen. `clock` is the standard error of the clock, samples.
 pub(crate) fn dead_time(
     series: &[Series],
     fits: &[Refined],
@@ -173,7 +173,7 @@ pub(crate) fn dead_time(
     let all: Vec<&Refined> = fits.iter().chain(&thirds).collect();
     let best = all[of_least_error(&all)?];
     let noise = widened_variance(&best.at);
-    // h, ln S and as many further parameters as are integrated.
+    // h, ln S and the further parameters that are integrated.
     let component = |fit: &Refined, integrated: usize, log_prior: f64| -> Option<Component> {
         let inverse = fit.inverse.as_ref()?;
         let stride = inverse.len().isqrt();

@@ -45,7 +45,7 @@ impl Tests {
         let Some(law) = self.law else {
             return DelayVerdict::TooFewEdges;
         };
-        // A change below one sample is rounded away in a model and within the bias of a measured delay.
+        // A change below one sample disappears by rounding in a model and is within the bias of a measured delay.
         let counts = |p: Option<f64>, size: f64| {
             p.is_some_and(|p| p < RULES.significant) && size.abs() >= RULES.relevant
         };
@@ -106,7 +106,7 @@ fn direction_says_more(points: &[DelayPoint], noticeable: f64) -> bool {
         && n * (rss_direction / law.rss).ln() + (2.0 - 3.0) * n.ln() < -RULES.clearly_better
 }
 
-/// Offset between rising and falling edges beside the law: p of its t test, and the offset in samples.
+/// Offset between rising and falling edges in addition to the law: p of its t test, and the offset in samples.
 fn direction_test(points: &[DelayPoint]) -> Option<(f64, f64)> {
     let (_, up, down) = by_direction(points);
     if up.count < RULES.tested_each || down.count < RULES.tested_each {

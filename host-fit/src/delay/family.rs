@@ -187,8 +187,8 @@ fn level_scale_and_sign_of_y_and_of_u_change_nothing() {
     }
 }
 
-/// A record may be cut anywhere (at rest, or 3, 9 and 18 samples after an edge): responses to commands before
-/// it do not bias its own edges.
+/// A record may begin anywhere (at rest, or 3, 9 and 18 samples after an edge): responses to earlier commands do
+/// not bias the record's own edges.
 #[test]
 fn a_record_may_be_cut_anywhere() {
     let (delay, at) = (20.0, 500);
@@ -254,7 +254,8 @@ fn heating_and_cooling_at_different_rates_have_one_dead_time() {
     }
 }
 
-/// A state-dependent delay at 10 ms: few samples between edges, so that the time constants are those of all edges.
+/// A state-dependent delay at 10 ms: there are few samples between edges, so the time constants are estimated from
+/// all edges together.
 #[test]
 fn a_rig_sampled_at_ten_milliseconds_is_measured_at_nearly_every_edge() {
     let mut rng = ChaCha8Rng::seed_from_u64(4);

@@ -1,9 +1,9 @@
-//! Where the front of a response lies: roughly, for all edges together, then for each.
+//! The position of a response's front: first roughly for all edges together, then for each edge.
 //!
-//! The mean of y over the `reach` samples from a time on, less the mean over those before it, is the matched filter for a
-//! change of level. Summed over all edges of one direction as a function of the time since the edge (each edge's vote
-//! bounded, so that no edge decides alone) it peaks at the middle of the front. Responses to the neighbouring edges have
-//! the other sign and do not add up.
+//! The matched filter for a change of level is the mean of y over the `reach` samples from a time on, minus the
+//! mean over the samples before it. Summed over all edges of one direction, as a function of the time since the
+//! edge, it peaks at the middle of the front. The contribution of each edge is bounded, so that no single edge
+//! decides. Responses to the neighbouring edges have the other sign and do not add up.
 
 use super::edge::Edge;
 use super::rules::RULES;
@@ -27,7 +27,7 @@ pub(crate) struct Expectation {
     gain_sign: f64,
     /// Samples of y used on either side of an arrival.
     pub(crate) reach: usize,
-    /// Longest delay that is looked for, samples.
+    /// Longest delay that is searched, samples.
     pub(crate) max_delay: usize,
 }
 
@@ -67,7 +67,7 @@ pub(crate) fn expect(
     max_delay: usize,
     reach: usize,
 ) -> Option<Expectation> {
-    // No edge counts more than twice the median.
+    // The weight of an edge is at most twice the median.
     let mut sizes: Vec<f64> = Vec::new();
     for ((_, edges), levels) in series.iter().zip(levels) {
         for edge in edges {
@@ -141,9 +141,9 @@ pub(crate) fn own_front(levels: &[f64], edge: Edge, expected: &Expectation) -> u
 
 /// The earliest peak (within `half_width` to either side) that is nearly as high as the highest.
 ///
-/// In periodic records the peak recurs with the period, and the earliest is the right one. Where a lightly
-/// damped flow swings back as fast as it responds, the earliest peak may be wrong; the first edge of each
-/// record, which starts from rest, then decides (`at_rest`).
+/// In periodic records the peak recurs with the period, and the earliest peak is the right one. In a lightly damped
+/// flow that swings back as fast as it responds, the earliest peak may be wrong. The first edge of each record,
+/// which starts from rest, then decides (`at_rest`).
 fn soonest_peak(votes: &[f64], at_rest: &[f64], half_width: usize) -> Option<usize> {
     let highest = votes.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let peaks: Vec<usize> = (0..votes.len())
@@ -183,8 +183,8 @@ fn gain_sign(series: &[(&[f64], Vec<Edge>)]) -> f64 {
     if sum < 0.0 { -1.0 } else { 1.0 }
 }
 
-/// Mean of y over the `reach` samples from each sample on, less that over the `reach` samples before it (0 before the
-/// record, which ends the filter where it ends).
+/// Mean of y over the `reach` samples from each sample on, minus the mean over the `reach` samples before it.
+/// Before the record y is 0; at its end the filter ends.
 pub(crate) fn level_filter(y: &[f64], reach: usize) -> Vec<f64> {
     let mut sums = Vec::with_capacity(y.len() + 1);
     let mut total = 0.0;

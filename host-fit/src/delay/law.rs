@@ -1,9 +1,9 @@
 //! The delay law (2): h̃(ỹ) = p0 + p1·exp(−p2·ỹ), by nonlinear least squares.
 //!
-//! p0 and p1 enter linearly, so for every p2 they follow from linear least squares (variable projection) and only p2 is
-//! searched: on a logarithmic grid, then by golden section. Single edges far off (5 robust standard deviations of a Huber
-//! fit) are set aside first and reported. Intervals are t-intervals from the Jacobian at the optimum; a test checks that
-//! they cover the truth as often as they say.
+//! p0 and p1 are linear, so for every p2 they follow from linear least squares (variable projection). Only p2 is
+//! searched: on a logarithmic grid, then by golden section. Outliers (5 robust standard deviations of a Huber fit)
+//! are first excluded and reported. Intervals are t-intervals from the Jacobian at the optimum; a test checks their
+//! coverage.
 
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
@@ -50,7 +50,7 @@ pub struct DelayLawFit {
     pub explained: f64,
     /// Edges in the fit.
     pub edges: usize,
-    /// Indices (into the points given) of edges set aside as outliers.
+    /// Indices (into the given points) of edges that are excluded as outliers.
     pub outliers: Vec<usize>,
     /// Smallest and largest ỹ in the fit: outside, the law is an extrapolation.
     pub range: (f64, f64),
@@ -90,7 +90,8 @@ impl DelayLawFit {
 }
 
 impl DelayLawFit {
-    /// h̃ at the lowest less h̃ at the highest ỹ of the fit, samples, with its standard error. ỹ below 0 counts as 0.
+    /// h̃ at the lowest ỹ of the fit minus h̃ at the highest, samples, with its standard error. ỹ below 0 counts as
+    /// 0.
     #[must_use]
     pub fn change(&self) -> (f64, f64) {
         let (low, high) = (self.range.0.max(0.0), self.range.1.max(0.0));
@@ -106,7 +107,7 @@ impl DelayLawFit {
         (self.at(low) - self.at(high), variance.max(0.0).sqrt())
     }
 
-    /// Why a fitted law must not be used, if there is a reason. `data` are the smallest and largest ỹ of all
+    /// The reason why a fitted law must not be used, if there is one. `data` are the smallest and largest ỹ of all
     /// samples, `longest` is the longest delay that was searched.
     pub(crate) fn objection(
         &self,
@@ -121,12 +122,12 @@ impl DelayLawFit {
         let range = format!("ỹ from {:.3} to {:.3}", self.range.0, self.range.1);
         if least.is_nan() || least < 0.0 {
             return Some(format!(
-                "it is {least:.1} samples at a ỹ within these data, and a delay cannot be negative"
+                "it is {least:.1} samples at a ỹ within these data, but a delay cannot be negative"
             ));
         }
         if most > longest {
             return Some(format!(
-                "it is {most:.3e} samples at a ỹ within these data, and delays were searched up to \
+                "it is {most:.3e} samples at a ỹ within these data, but delays were searched up to \
                 {longest:.0}"
             ));
         }

@@ -1,4 +1,4 @@
-//! One plant with a dead time through whole records.
+//! A fit of one plant with a dead time to whole records.
 //!
 //! Every record is described by y = level + initial state + K·(response to u, delayed by h): the plant of [`Plant`], one
 //! gain K for all records, a level and a free initial state (one value for each order) per record. Gain, levels and
@@ -30,7 +30,7 @@ const STEPS: usize = 40;
 /// One record prepared for fits.
 #[derive(Debug, Clone)]
 pub(crate) struct Series {
-    /// y less its mean; 0 before `from`.
+    /// y minus its mean; 0 before `from`.
     pub(crate) y: Vec<f64>,
     /// The changes of u.
     pub(crate) switching: Switching,
@@ -150,11 +150,11 @@ pub(crate) struct Evaluation {
     pub(crate) plant: Plant,
     /// K, units of y per unit of u.
     pub(crate) gain: f64,
-    /// y less the fit, one series for each record.
+    /// y minus the fit, one series for each record.
     pub(crate) residuals: Vec<Vec<f64>>,
     /// Sum of squares of `residuals`.
     pub(crate) rss: f64,
-    /// By how much the command lowers the sum of squares.
+    /// The reduction of the sum of squares by the command.
     pub(crate) explained: f64,
 }
 
@@ -286,7 +286,7 @@ pub(crate) fn coarse(series: &[Series], max_delay: f64, spacing: usize) -> Vec<P
 /// The parameters that a refinement may change.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Free {
-    /// b, beside h and S.
+    /// b, in addition to h and S.
     pub(crate) order: bool,
     /// The difference of S between on and off.
     pub(crate) dynamics: bool,
@@ -357,7 +357,7 @@ pub(crate) fn refine(
     let mut inverse = None;
     for step in 0..STEPS {
         let plant = at.plant;
-        // Steps of the difference quotients; backwards where the bound is near.
+        // Steps of the difference quotients; backward differences near a bound.
         let delta_h = 1e-3 * plant.mean_sum().clamp(1.0, 100.0);
         let deltas = [
             if plant.mean_delay() + delta_h > max_delay {
@@ -444,7 +444,7 @@ pub(crate) fn fit(series: &[Series], starts: &[Plant], max_delay: f64) -> Vec<Re
     };
     let around = STARTS.into_iter().map(|ratio| {
         let plant = first.at.plant;
-        // The second time constant is about b·S; it is taken from the dead time.
+        // The second time constant is about b·S; the dead time is shortened by it.
         let second = ratio * plant.mean_sum();
         Plant::linear(
             (plant.mean_delay() - second).max(0.0),

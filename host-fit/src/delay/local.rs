@@ -1,10 +1,10 @@
-//! The dead time of single edges, once the dynamics are known from all of them.
+//! The dead time of single edges, when the dynamics are known from all of them.
 //!
-//! On the *trajectory* of one plant through the record, one edge is moved in time: the shift d of its response
-//! K·Δu·(s(t − a − d) − s(t − a)) that explains the residual around the edge best, beside an offset. In a *window* of its
-//! own an edge has its own level, initial state and gain, and only the time constants are those of all; these are
-//! searched in the windows too, since dead times that differ from edge to edge look like a second time constant to a
-//! plant that has one dead time.
+//! On the *trajectory* of one plant through the record, one edge is moved in time. The best shift d of its
+//! response, K·Δu·(s(t − a − d) − s(t − a)), explains the residual around the edge, together with an offset. In a
+//! *window* an edge has its own level, initial state and gain, and shares only the time constants with the other
+//! edges. The time constants are searched in the windows too: to a plant with one dead time, dead times that differ
+//! between edges look like a second time constant.
 
 use super::linear::{Series, evaluate};
 use super::onset::Unmeasured;
@@ -25,7 +25,7 @@ const RATIOS: [f64; 6] = [0.0, 0.03, 0.08, 0.15, 0.25, 0.6];
 pub(crate) struct EdgeDelayed {
     /// Samples.
     pub(crate) delay: f64,
-    /// Its standard error with the time constants as they are, samples.
+    /// Its standard error for fixed time constants, samples.
     pub(crate) standard_error: f64,
 }
 
@@ -287,7 +287,7 @@ pub(crate) fn by_window(
         .collect();
     let mut plant = pooled.plant;
     let mut measured: Vec<Vec<Option<Measured>>> = Vec::new();
-    // Two passes: the neighbouring responses bound a window and are known only roughly at first.
+    // Two passes: the neighbouring responses limit a window, and in the first pass they are known only roughly.
     for _ in 0..2 {
         let windows: Vec<Vec<Option<Window<'_>>>> = all
             .iter()
@@ -321,7 +321,7 @@ pub(crate) fn by_window(
             }
         }
     }
-    // One variance for all: a window has few samples.
+    // One variance for all windows, because a single window has few samples.
     let mut variances: Vec<f64> = measured
         .iter()
         .flatten()
@@ -401,7 +401,7 @@ fn shape(windows: &[&Window<'_>], start: Plant, gain_sign: f64) -> Plant {
     let best = tried.into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
     match (first, best) {
         (Some(first), Some(best)) => {
-            // A second order must pay for its parameter (BIC).
+            // A second order must improve BIC.
             let samples = samples.max(2) as f64;
             let gain = samples * (first.0 / best.0.max(f64::MIN_POSITIVE)).ln();
             if gain > samples.ln() { best.1 } else { first.1 }

@@ -1,9 +1,9 @@
 //! Delays of the response, edge by edge, and the law (2) through them.
 //!
-//! [`study_delays`] fits one plant with a dead time to whole records and takes the delay of every edge from it; where no
-//! plant describes the records it measures when y starts to respond to each edge ([`Onset`] says how). It pairs the
-//! delays with the averaged output (1) at that time, fits h̃(ỹ) = p0 + p1·exp(−p2·ỹ) to the edges of the identify
-//! records, and keeps the law where the data bear it out. Theory 1.5 has the method.
+//! [`study_delays`] fits one plant with a dead time to whole records and derives the delay of every edge from it.
+//! If no plant describes the records, it measures when y starts to respond to each edge ([`Onset`]). It pairs the
+//! delays with the averaged output (1) at that time and fits h̃(ỹ) = p0 + p1·exp(−p2·ỹ) to the edges of the
+//! identify records. The law is kept if tests support it. Theory 1.6 has the method.
 
 mod begun;
 mod dead_time;

@@ -1,19 +1,21 @@
 //! When y starts to respond to an edge of the command.
 //!
-//! A response is a *kink*: until it arrives y follows whatever it was doing, from then on it heads elsewhere. A threshold
-//! on y would move with its level and with the noise, so the kink itself is located, by least squares of
+//! A response is a *kink* in y: y continues its previous motion until the response arrives, and then changes
+//! course. A threshold on y would depend on its level and on the noise. Therefore the kink is located by least
+//! squares of
 //!
 //!    y(t) = c0 + c1·l(t) + A·r(t − a),   l(t) = exp(−t/τ_l) or t,   r(s) = 1 − exp(−s/τ_r) or s for s > 0, else 0
 //!
 //! over the arrival a (to ¼ sample) and the shapes τ_l, τ_r from a grid, around the front of the response (see
 //! `front.rs`) and between the arrivals of the neighbouring edges. A must have the sign of the edge. The first two
-//! terms carry on what y was doing, the third is the response. a less the sample of the edge is the delay h of (3):
-//! y_{k+1} is the first sample that u_{k−h} can change.
+//! terms continue the previous motion of y; the third term is the response. The delay h of (3) is a minus the
+//! sample of the edge: y_{k+1} is the first sample that u_{k−h} can change.
 //!
 //! The standard error comes from the profile of the residual sum of squares over a (where it has risen by the noise
-//! variance), widened for the autocorrelation of the residuals; noise slower than `reach` bends y like a response does and
-//! is not in it. An edge whose response is not 5 standard deviations above the noise, or is cut off, or is located to no
-//! better than the worst error of [`super::Rules`], is not measured and says why.
+//! variance), inflated for the autocorrelation of the residuals. It does not include noise slower than `reach`,
+//! which bends y like a response. An edge is not measured, with a reason, in three cases: its response is less than
+//! 5 standard deviations above the noise, the response is cut off, or its standard error exceeds the worst one of
+//! [`super::Rules`].
 
 use super::edge::Edge;
 use super::front::{Expectation, expect, level_filter, own_front};
@@ -52,8 +54,8 @@ pub struct Onset {
     pub delay: f64,
     /// Standard error of `delay`, samples.
     pub standard_error: f64,
-    /// Samples from the edge to half of the response (between y at its start and its level when the next response
-    /// arrives, or after [`Rules::response`](super::Rules)), if it gets there.
+    /// Samples from the edge to half of the response, if y reaches it. Half is between y at the start of the
+    /// response and the level when the next response arrives, or after [`Rules::response`](super::Rules).
     pub half_response: Option<f64>,
 }
 
@@ -109,7 +111,7 @@ impl<'a> Neighbourhood<'a> {
         last: f64,
     ) -> Result<Stretch, Unmeasured> {
         let (from, to) = (from.max(self.earliest), to.min(self.latest));
-        // Before a record that starts with an edge there is only the zero history.
+        // Before a record that starts with an edge, all signals are 0.
         let left = if from == 0 { 0 } else { RULES.least_side };
         let stretch = Stretch {
             from,
@@ -186,7 +188,7 @@ impl<'a> Neighbourhood<'a> {
 
 /// The responses to all edges of some records of one rig, in the order of the edges.
 ///
-/// Two passes: the starts of neighbouring responses are known only roughly in the first.
+/// Two passes: in the first, the starts of neighbouring responses are known only roughly.
 pub(crate) fn measure_all(
     series: &[(&[f64], Vec<Edge>)],
     max_delay: usize,
@@ -432,7 +434,7 @@ fn widening(residual: &[f64]) -> f64 {
     (1.0 + rho) / (1.0 - rho)
 }
 
-/// Time at which y (mean of 5 samples) first passes half of its way from the level at the arrival to the level it has
+/// Time at which y (mean of 5 samples) first passes the middle between the level at the arrival and the level
 /// before `end`.
 pub(crate) fn half_response(y: &[f64], arrival: f64, level: f64, end: usize) -> Option<f64> {
     let start = arrival.round().max(0.0) as usize;

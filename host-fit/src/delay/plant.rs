@@ -2,10 +2,10 @@
 //!
 //!    b·S²·ÿ + S·ẏ + y = K·u(t − h)
 //!
-//! S is the sum of the time constants T₁ + T₂, b = T₁T₂/S² their product over its square: b = 0 is first order, b = ¼ two
-//! equal time constants, b above ¼ a plant that rings (damping ratio 1/(2√b)). u is held between samples; h need not be a
-//! whole number of them. S may differ between the command on and off, and h between rising and falling edges: the
-//! simplest bilinear plant. It is linear in K, in the level and in the initial state all the same.
+//! S is the sum of the time constants T₁ + T₂; b = T₁T₂/S². b = 0 is first order, b = ¼ two equal time constants, b
+//! above ¼ an underdamped plant (damping ratio 1/(2√b)). u is held between samples; h need not be a whole number of
+//! samples. S may differ between command on and off, and h between rising and falling edges: the simplest bilinear
+//! plant. It is linear in K, in the level and in the initial state in any case.
 //!
 //! A third lag T₃ in series may follow, by the trapezoidal rule between samples: accurate to 1/(12·T₃²) of a response.
 
@@ -94,7 +94,7 @@ impl Dynamics {
             (decay, decay * time)
         } else if spread > 0.0 {
             let root = spread.sqrt();
-            // The slow pole without the difference of nearly equal numbers.
+            // The slow pole, computed without a difference of nearly equal numbers.
             let slow = (-2.0 * time / (s * (1.0 + root))).exp();
             let fast = (-0.5 * time * (1.0 + root) / bs).exp();
             ((slow + fast) / 2.0, (slow - fast) * bs / root)
@@ -224,7 +224,7 @@ impl Plant {
         self.lag(out, 0.0);
     }
 
-    /// Passes a course of values through the third lag, which starts at `from`.
+    /// Passes a series of values through the third lag, whose initial state is `from`.
     fn lag(&self, values: &mut [f64], from: f64) {
         if self.third <= 0.0 {
             return;

@@ -180,7 +180,7 @@ fn with_directions(series: &[Series], fits: Vec<Refined>, max_delay: f64) -> (Ve
         let Some(best) = next.iter().min_by(|a, b| a.at.rss.total_cmp(&b.at.rss)) else {
             break;
         };
-        // Further parameters that follow a disturbance whiten the residual: both variances are considered.
+        // Further parameters that follow a disturbance make the residual whiter: both variances are considered.
         let before = known
             .iter()
             .min_by(|a, b| a.at.rss.total_cmp(&b.at.rss))

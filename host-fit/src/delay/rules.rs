@@ -20,52 +20,54 @@ rules! {
     plant_fits: f64 = 0.06, "share of the spread of y", "calibrated on data/ (residual 5 to 10 % where delays vary from edge to edge) and on tests/data/strangers (at most 5 %)";
     /// The noise of a plant's residual may be this factor above the noise estimated from second differences
     /// of y.
-    noise_allowed: f64 = 1.5, "times the standard deviation", "judgement: noise need not be white";
+    noise_allowed: f64 = 1.5, "times the standard deviation", "judgement: the noise may be coloured";
     /// An edge needs this many samples on either side to be located by itself; with fewer, the time constants
     /// of all edges are used.
-    fewest_reach: usize = 12, "samples", "judgement: twice the fewest samples beside an arrival";
-    /// Samples on either side of an arrival: this many response times, or half the time between edges if that is less.
+    fewest_reach: usize = 12, "samples", "judgement: twice the fewest samples on either side of an arrival";
+    /// Half width of the window around an arrival: this many response times, or half the time between edges if that
+    /// is less.
     reach: f64 = 3.0, "response times", "judgement: 95 % of a response of first order";
 
     /// Fewest samples on either side of an arrival.
     least_side: usize = 6, "samples", "judgement";
     /// Grid spacing of arrivals.
-    resolution: f64 = 0.25, "samples", "judgement: a quarter of what a model rounds to";
-    /// Time constants of the course before a response; 0 is a straight line.
+    resolution: f64 = 0.25, "samples", "judgement: a quarter of the rounding to whole samples";
+    /// Time constants of the motion before a response; 0 is a straight line.
     before_shapes: [f64; 9] = [0.0, 8.0, 12.0, 17.0, 25.0, 36.0, 55.0, 90.0, 180.0], "samples", "a grid in steps of about 1.5";
     /// Time constants of a response; 0 is a straight line.
     response_shapes: [f64; 17] = [0.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 128.0, 256.0, 3.0, 6.0, 11.0, 22.0, 45.0, 90.0, 180.0, 360.0], "samples", "a grid in steps of about 1.4, every other one first";
-    /// The first search for the start of a response uses only the first so many shapes of both.
+    /// The first search for the start of a response uses only this many of the shapes before and after it.
     coarse_shapes: usize = 9, "", "every other response";
-    /// Largest autocorrelation of neighbouring residuals that is allowed for; a higher one means an
-    /// unmodelled course.
-    most_correlation: f64 = 0.82, "", "widens a variance by 10 at most; tested in `onset.rs`";
+    /// Largest autocorrelation of neighbouring residuals by which a variance is corrected; a higher one means that
+    /// the motion before the response is not modelled.
+    most_correlation: f64 = 0.82, "", "multiplies a variance by at most 10; tested in `onset.rs`";
 
-    /// The earliest peak of at least this height relative to the highest is the front.
+    /// The earliest peak of the likelihood of at least this height, relative to the highest, is the start of the
+    /// response.
     front_height: f64 = 0.8, "share of the highest", "judgement; tested in `front.rs`";
-    /// Factor by which the first edges must prefer a later peak.
+    /// A later peak is preferred if the first edges make it more likely by this factor.
     front_clearly: f64 = 2.0, "times", "judgement; tested in `front.rs`";
-    /// A level change counts at most this many times the median one.
+    /// The weight of a level change is at most this many times the median weight.
     front_largest: f64 = 2.0, "times the median", "judgement: limits the weight of one large response";
 
     /// Fewest measured edges for a law.
-    law_edges: usize = 5, "edges", "two more than the law has parameters";
+    law_edges: usize = 5, "edges", "the law has three parameters";
     /// First value of p2·(range of ỹ) on its logarithmic grid.
-    slowest_rate: f64 = 0.05, "", "a law that is straight over the range";
+    slowest_rate: f64 = 0.05, "", "the law is almost linear over the range";
     /// Last value of p2·(range of ỹ) on its grid.
-    fastest_rate: f64 = 300.0, "", "a law that is a step at the lowest ỹ";
+    fastest_rate: f64 = 300.0, "", "the law is almost a step at the lowest ỹ";
     /// Number of grid values of p2.
     rates: usize = 60, "", "steps of 16 %";
     /// Edges further from the robust fit than this get a proportionally lower weight.
     robust: f64 = 1.345, "robust standard deviations", "convention: 95 % efficiency on normal errors (Huber 1964)";
-    /// Least scale of the robust fit: delays are not known better than this.
+    /// Least scale of the robust fit, because delays are not measured more accurately than this.
     known_to: f64 = 0.2, "samples", "judgement: smaller scatter is coincidence";
     /// Edges further from the robust fit than this are excluded as outliers.
     outlier: f64 = 5.0, "robust standard deviations", "convention; tested in `law.rs`";
 
     /// Coverage of the intervals of a dead time and of the law's parameters.
     confidence: f64 = 0.95, "", "convention; tested in `law.rs`";
-    /// A response is taken as settled after this time.
+    /// A response counts as settled after this time.
     response: usize = 5, "times the reach", "judgement: 99 % of a response of first order";
 
     /// Fewest measured edges for the tests.
@@ -81,16 +83,17 @@ rules! {
     /// A difference between directions below this share of the mean delay is not significant: the measured
     /// start depends slightly on the shape of a response, which differs between rising and falling edges.
     shape_bias: f64 = 0.1, "share of the mean delay", "judgement";
-    /// A constant delay per direction replaces the law if it is better by this.
+    /// A constant delay per direction replaces the law if its criterion is better by this.
     clearly_better: f64 = 10.0, "BIC", "convention: very strong evidence (Kass & Raftery 1995)";
 
-    /// Largest autocorrelation of neighbouring residuals that is allowed for in a fit to whole records.
-    slowest_disturbance: f64 = 0.98, "", "widens a variance by 99 at most: a disturbance over 50 samples";
-    /// Least standard error of a delay: loggers and simulations differ by up to a sample in the definition of
-    /// simultaneous u and y.
+    /// Largest autocorrelation of neighbouring residuals by which a variance is corrected in a fit to whole
+    /// records.
+    slowest_disturbance: f64 = 0.98, "", "multiplies a variance by at most 99: a disturbance over 50 samples";
+    /// Least standard error of a delay: loggers and simulations differ by up to a sample in the simultaneity of u
+    /// and y.
     clock: f64 = 0.5, "samples", "judgement: an interval of at least ± 1 sample; tested in `dead_time.rs` on tests/data/strangers";
     /// Edges per record on which the sensitivity to `reach` is measured.
-    settings_edges: usize = 12, "edges", "judgement: long records would take three times as long";
-    /// Ratios of the time constants on either side of the best over which the dead time is averaged.
+    settings_edges: usize = 12, "edges", "judgement: more edges would triple the time on long records";
+    /// The dead time is averaged over ratios of the time constants up to this far on either side of the best one.
     ratios: usize = 10, "", "steps of at most 30 %";
 }

@@ -1,4 +1,4 @@
-//! The delays of a data set: the fitted law, their statistics, and the tests on which the verdict rests.
+//! The delays of a data set: the fitted law, its statistics, and the tests on which the verdict is based.
 
 use super::begun::Begun;
 use super::dead_time::DeadTime;
@@ -24,9 +24,9 @@ pub struct DelayOptions {
     pub window: u32,
     /// Longest delay that is searched, samples. By default the longest that the records can show.
     pub max_delay: Option<usize>,
-    /// Samples of y used on either side of a response's start where each edge is located by itself: more
-    /// reduce the noise, fewer suit faster responses. By default three response times, or half the time
-    /// between edges if that is less.
+    /// Samples of y used on either side of a response's start if each edge is located by itself. More samples
+    /// reduce the noise; fewer suit faster responses. By default three response times, or half the time between
+    /// edges if that is less.
     pub reach: Option<usize>,
     /// Seed of the permutation tests.
     pub seed: u64,
@@ -62,8 +62,8 @@ impl DelayMethod {
     pub fn words(self) -> &'static str {
         match self {
             Self::Trajectory => "one plant fitted to whole records",
-            Self::Kink => "the start of each response alone",
-            Self::Window => "each response alone, with time constants common to all",
+            Self::Kink => "the start of each response, located separately",
+            Self::Window => "each response separately, with common time constants",
         }
     }
 }
@@ -94,7 +94,7 @@ pub struct EdgeDelay {
     pub time_s: f64,
     /// The start of the response, or why it could not be measured.
     pub onset: Result<Onset, Unmeasured>,
-    /// ỹ (1) at the start of the response, where that was measured.
+    /// ỹ (1) at the start of the response, if that was measured.
     pub mean_output: Option<f64>,
 }
 
@@ -146,7 +146,7 @@ pub struct DelayStudy {
     pub rising: Option<DeadTime>,
     /// The dead time of falling edges alone.
     pub falling: Option<DeadTime>,
-    /// The law through the measured edges of the identify records, if it is significant.
+    /// The law fitted to the measured edges of the identify records, if it is significant.
     pub law: Option<DelayLawFit>,
     /// Why there is no law, in words.
     pub law_not_kept: Option<String>,
@@ -160,7 +160,7 @@ pub struct DelayStudy {
     pub p_law: Option<f64>,
     /// The same within rising and within falling edges.
     pub p_law_within_direction: Option<f64>,
-    /// p-value of the difference between rising and falling edges beside the law (t test).
+    /// p-value of the difference between rising and falling edges at the same ỹ (t test).
     pub p_direction: Option<f64>,
     /// Rising minus falling at the same ỹ, samples, from the law with an offset.
     pub direction_offset: Option<f64>,

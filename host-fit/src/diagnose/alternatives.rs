@@ -16,8 +16,8 @@ pub(super) struct Set {
 }
 
 impl Set {
-    /// The members, the effect first. A second lag of the flow is one of a lag in series, since their outputs are the
-    /// same by construction.
+    /// The members, the effect first. A lag in series is not distinguishable from a second lag of the flow, because
+    /// their outputs are equal by construction.
     pub(super) fn names(&self) -> Vec<String> {
         let own = std::iter::once(self.effect.name.to_owned());
         let same = self.adds_flow_lag().then(|| FLOW_LAG.to_owned());
@@ -29,7 +29,7 @@ impl Set {
         self.effect.lag_in_series && self.others.iter().all(|(name, _)| name != FLOW_LAG)
     }
 
-    /// Posterior probability of each of [`names`](Self::names). Empty where every free run diverges.
+    /// Posterior probability of each of [`names`](Self::names). Empty if every free run diverges.
     pub(super) fn posterior(&self, likelihood: &Likelihood<'_>, last: &Judged) -> Vec<f64> {
         let own = std::iter::once(last.model());
         let same = self.adds_flow_lag().then_some(last.model());

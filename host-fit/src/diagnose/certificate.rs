@@ -11,21 +11,22 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use std::sync::PoisonError;
 
-/// The certificate of an effect: a bound on its false-alarm rate, whatever else is missing (theory 4.5).
+/// The certificate of an effect: a bound on its false-alarm rate, valid even if other effects are missing (theory
+/// 4.5).
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Certificate {
     /// ln of the Bayes factor of the model with the effect against the best model without it, nats.
     pub evidence_nats: f64,
-    /// ln of the e-value against "no model without the effect needs more", nats: `evidence_nats` minus ln of the number
-    /// of models tried.
+    /// ln of the e-value against the hypothesis that a model without the effect is true, nats: `evidence_nats`
+    /// minus ln of the number of models tried.
     pub log_e: f64,
     /// Level α, 0 to 1. The effect is certified if the log e-value is at least ln(1/α). At most a share α of
-    /// certificates is false, provided that the noise model holds and the base class contains the true base.
+    /// certificates is false, provided that the noise model is right and the base class contains the true base.
     pub alpha: f64,
     /// Names of the records from which it was computed.
     pub records: Vec<String>,
-    /// Of the variance that the best model without the effect leaves unexplained, the share that the model with it
-    /// explains: at most 1, and below 0 where it leaves more.
+    /// Share of the variance left unexplained by the best model without the effect that the model with it explains.
+    /// At most 1; negative if the model with the effect leaves more.
     #[serde(skip)]
     pub share: f64,
 }
@@ -51,7 +52,7 @@ impl Certificate {
     }
 }
 
-/// Parsimony: the final model explains the records better than the given one, with fewer parameters.
+/// Parsimony: the final model has more evidence than the given one, with fewer parameters.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Parsimony {
     /// The effects of the final model.
@@ -84,8 +85,8 @@ impl Session<'_> {
         })
     }
 
-    /// ln of the evidence of a model at its most likely parameters, nats; `None` if its free run diverges. Several questions
-    /// ask for the same models: each is fitted once.
+    /// ln of the evidence of a model at its most likely parameters, nats; `None` if its free run diverges. Several
+    /// certificates need the same models, so each model is fitted once.
     pub(super) fn evidence_of(&self, model: &Model) -> Option<f64> {
         let all = || {
             self.evidences
@@ -158,7 +159,7 @@ impl Session<'_> {
             self.search.without(subject, index, &found.root)
         };
         let mut lesser: Vec<Option<Hypothesis>> = parallel::each(0..subject.terms.len(), without);
-        // Null models are often common to several effects: each is fitted once.
+        // Null models are often common to several effects, so each is fitted once.
         let mut distinct: Vec<Hypothesis> = Vec::new();
         let mut effects: Vec<(String, Vec<usize>)> = Vec::new();
         for (index, effect) in subject.terms.iter().enumerate() {
@@ -188,7 +189,7 @@ impl Session<'_> {
         }
         let nulls: Vec<Option<Null>> = parallel::each(&distinct, |null| self.null(null));
         let certificates = effects.into_iter().filter_map(|(name, places)| {
-            // Against a model whose evidence is not known nothing is certified.
+            // Without the evidence of a null model nothing is certified.
             let nulls: Option<Vec<Null>> = places.into_iter().map(|at| nulls[at]).collect();
             Some((name, self.certificate(subject, &nulls?, found)?))
         });
@@ -196,7 +197,7 @@ impl Session<'_> {
     }
 }
 
-/// What a certificate needs of a model that lacks the effect.
+/// The properties of a model without the effect that a certificate needs.
 #[derive(Clone, Copy)]
 struct Null {
     /// ln of the evidence, nats.
@@ -205,7 +206,7 @@ struct Null {
     excess: f64,
 }
 
-/// Whether two hypotheses are one model, found on two ways.
+/// Whether two hypotheses are the same model, found by two searches.
 fn is_same(a: &Hypothesis, b: &Hypothesis) -> bool {
     let [least, most] = [f64::min, f64::max].map(|of| of(a.judged.rmse(), b.judged.rmse()));
     a.is_built_as(b.judged.model()) && most <= (1.0 + f64::EPSILON.sqrt()) * least
@@ -215,7 +216,7 @@ fn is_same(a: &Hypothesis, b: &Hypothesis) -> bool {
 mod tests {
     use super::*;
 
-    /// ln(50) nats are a p-value of 0.02; an e-value below 1 says nothing.
+    /// ln(50) nats correspond to a p-value of 0.02; an e-value below 1 gives no information.
     #[test]
     fn an_e_value_bounds_the_p_value_by_its_inverse() {
         let p_value = |log_e: f64| {
@@ -246,7 +247,7 @@ mod tests {
             (certificate.holds(), certificate.holds_beside_others())
         };
         assert_eq!(holds(223.0, 0.86), (true, true));
-        // Most of what it takes may be another cause's.
+        // Most of what the effect explains may have another cause.
         assert_eq!(holds(223.0, 0.56), (true, false));
         assert_eq!(holds(-184.0, 0.9), (false, false));
         assert_eq!(holds(3.0, 0.9), (false, false));

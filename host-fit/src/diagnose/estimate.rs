@@ -33,8 +33,8 @@ pub(crate) fn estimates(
     estimates_among(fit, &[], spec, units)
 }
 
-/// The same with the choice of the structure included: the scatter of the parameters over `alike`, models
-/// with the same effects and an equivalent validation error, is added to the variance.
+/// The same, including the choice of the structure: the scatter of the parameters over `alike`, models with the
+/// same effects and an equivalent validation error, is added to the variance.
 pub(crate) fn estimates_among(
     fit: &Fit,
     alike: &[&Model],
@@ -75,9 +75,9 @@ pub(crate) fn estimates_among(
     .collect()
 }
 
-/// Whether the records identify an effect: the interval of its amplitude excludes 0, and at least one of its
-/// positive parameters is known to within a factor. Two parameters may be correlated, as the two of King's
-/// law are: then only a combination of them is known.
+/// Whether the records identify an effect: the interval of its amplitude excludes 0, and the interval of at least
+/// one positive parameter is narrower than a factor. Two parameters may be correlated, for example those of King's
+/// law; then only a combination of them is identifiable.
 pub(super) fn is_identified(fit: &Fit, spec: &Spec) -> bool {
     let values = fit.model.values();
     let mut spans = own(&fit.model, spec)

@@ -31,8 +31,8 @@ pub(super) fn memory(model: &Model) -> Vec<Memory> {
         .filter(|(lag, _)| !is_memory(lag))
         .map(|(_, c)| c)
         .sum();
-    // If the short lags nearly cancel, their sum is no relaxation rate: the dominant pole is used instead. A
-    // strong memory hides the pole; then the rate of the short lags is taken as it is.
+    // If the short lags nearly cancel, their sum is not a relaxation rate, and the dominant pole is used instead.
+    // If a strong memory hides that pole, the rate of the short lags is used.
     let slowest = model.sample_period_s / model.time_constant();
     let or_slowest = |rate: f64| {
         if slowest.is_finite() && rate <= RULES.cancelled * slowest {

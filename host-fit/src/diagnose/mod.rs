@@ -1,8 +1,7 @@
 //! Which physical effect is missing.
 //!
-//! The search over [`terms`](crate::terms) finds the best model with effects and the
-//! best without. What is said of them is decided here: whether anything is missing,
-//! what it is called, what else it could be, and how sure that is.
+//! The search over [`terms`](crate::terms) finds the best model with effects and the best without. This module
+//! decides on the verdict: whether an effect is missing, its name, its equivalence set, and the confidence.
 
 mod alternatives;
 mod certificate;
@@ -71,7 +70,7 @@ impl Default for Options {
     }
 }
 
-/// Diagnoses `given` on `records`. `progress` is told what is being tried.
+/// Diagnoses `given` on `records`. `progress` receives messages on the candidate that is being tried.
 ///
 /// # Errors
 /// [`DiagnoseError`].
@@ -93,7 +92,7 @@ pub fn diagnose(
     })
 }
 
-/// The diagnosis by `records`, all of them.
+/// The diagnosis with all `records`.
 fn chosen(
     given: &Model,
     records: &[Record],
@@ -144,7 +143,7 @@ fn chosen(
         return Ok(session.conclude(given_alone.alone(), rungs, &given_inside, &as_given, None));
     }
     progress("the model with the fewest lags");
-    // Rigs that are no blown ramp: their dynamics is the user's choice of lags.
+    // Data sets of other plants than flows: the user chooses the lags.
     let own_dynamics = mid_run && given.start == Start::Measured && !judge.on_off;
     let (root, step) = if own_dynamics {
         session.root_of_given(&given_inside, &as_given)?
@@ -162,8 +161,7 @@ fn chosen(
         Some(&|| search.second_roots(&given_inside, &origin)),
         &mut effort,
     );
-    // A structure that is not made of the search's terms may still hold what they do
-    // not reach one by one.
+    // The given structure may contain terms that the search cannot reach by single steps.
     let reached = found.best.judged.rmse();
     if (judge.over_noise(reached) > RULES.floor_margin
         || reached > (1.0 - RULES.worthwhile) * as_given.rmse())
@@ -178,7 +176,8 @@ fn chosen(
             found = from_given;
         }
     }
-    // The form of a delay law in the given model was chosen without the effects: beside them another may do better.
+    // The form of the delay law in the given model was chosen without the effects. With them another form may have
+    // a lower error.
     if judge.over_noise(found.best.judged.rmse()) > RULES.floor_margin
         && given_inside.delay.follows_y()
         && !effort.is_spent()

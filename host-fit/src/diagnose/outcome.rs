@@ -71,10 +71,10 @@ impl Diagnosis {
 }
 
 impl Rung {
-    /// The step of the given model again, as the last step of a ladder without improvement.
+    /// Repeats the step of the given model as the last step of a ladder without improvement.
     pub(crate) fn once_more(self) -> Self {
         Self {
-            step: "the model as given, which is better".to_owned(),
+            step: "the given model, which has a smaller error".to_owned(),
             ..self
         }
     }
@@ -152,11 +152,11 @@ pub struct NotTried {
 pub struct Diagnosis {
     /// The verdict.
     pub verdict: Verdict,
-    /// The missing effects in the order added. Empty if the verdict is "unexplained" or "partly explained",
-    /// also where the ladder shows effects that were tried.
+    /// The missing effects in the order added. Empty if the verdict is "unexplained" or "partly explained", even if
+    /// the ladder shows effects that were tried.
     pub missing: Vec<String>,
-    /// Surrogates: effects that describe part of the model error without being significant. Beside `missing`,
-    /// those without which the model fits within the uncertainty of the noise level.
+    /// Surrogates: effects that describe part of the model error without being significant. In addition to
+    /// `missing`, effects without which the error is within the uncertainty of the noise level.
     pub stand_ins: Vec<String>,
     /// Those of `stand_ins` that are certified although something else is unexplained (verdict "partly explained").
     pub certified: Vec<String>,
@@ -168,7 +168,7 @@ pub struct Diagnosis {
     pub tried: usize,
     /// How the validation error was obtained.
     pub held_out_by: HeldOutBy,
-    /// Free runs are restarted from the measurement after so many seconds, for rigs that drift: see
+    /// Free runs are restarted from the measurement after this many seconds, for plants that drift: see
     /// [`restart_after`](crate::fit::restart_after).
     pub restarted_s: Option<f64>,
     /// Where the noise level comes from.
@@ -191,7 +191,7 @@ pub struct Diagnosis {
     pub evidence_nats: Option<f64>,
     /// The certificate of each effect of the best model, named or not.
     pub certificates: BTreeMap<String, Certificate>,
-    /// What `missing` gains in evidence with fewer parameters than the given model.
+    /// Evidence that the model with `missing` gains over the given model, with fewer parameters.
     pub parsimony: Option<Parsimony>,
     /// Posterior probability of each member of each of `sets`.
     pub posterior: Vec<Vec<f64>>,

@@ -78,8 +78,8 @@ fn refitted(
         table,
         context.judged.rmse(),
         |place, name, candidate| {
-            // Base terms promise little to first order and often fit equally well after a refit, as do named effects
-            // at another grid point: these are refitted too.
+            // Base terms often have a small first-order prediction and fit equally well after a refit. The same
+            // holds for named effects at another grid point. Both are refitted too.
             let wanted = place < RULES.ranked_in_full
                 || candidate.term.effect().is_none()
                 || named.contains(&name)

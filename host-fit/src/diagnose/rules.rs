@@ -4,24 +4,27 @@ use crate::rules;
 use model_core::recursion::SHORTEST_MEMORY;
 
 rules! {
-    /// When a model error counts, when an effect is named, and when it is only a surrogate.
+    /// When a model error is significant, when an effect is named, and when it is only a surrogate.
     pub struct Rules in "diagnose";
 
-    /// A model whose error is within this factor of a known noise level fits. A further effect is then a surrogate.
-    floor_margin: f64 = 1.03, "times the noise level", "`y_sd` of 20 repeats, pooled over the validation records, gives the noise to 0.4 %; models of the right structure have 0.98 to 1.02";
+    /// If the error of a model is within this factor of a known noise level, the model is adequate. A further
+    /// effect is then a surrogate.
+    floor_margin: f64 = 1.03, "times the noise level", "`y_sd` of 20 repeats, pooled over the validation records, gives the noise to 0.4 %; the error of models with the right structure is 0.98 to 1.02 of it";
     /// Level of the tests.
     level: f64 = 0.05, "p-value", "convention";
-    /// Family-wise level: an e-value has to be at least its inverse.
+    /// Family-wise level: the e-value must be at least the inverse of this.
     level_of_search: f64 = 0.02, "p-value", "target: at most 3 % false names";
     /// At a known noise level an effect is left out, or replaced by lags, if the validation error rises by no more than this
     /// fraction.
-    worthwhile: f64 = 0.015, "share of the rms error", "null cases of six families: noise alone reaches 0.01";
+    worthwhile: f64 = 0.015, "share of the rms error", "cases without an effect in six families: noise alone \
+         reaches 0.01";
     /// Validation errors that differ by less than this are equal in practice.
     alike: f64 = 0.005, "share of the rms error", "judgement: a tenth of the difference between two noise seeds";
-    /// If the final model is above the noise level, effects are named only if they explain at least this
-    /// share of the unexplained variance and leave an error below `much` of the search; otherwise they are
-    /// surrogates.
-    explained: f64 = 0.95, "share of the model error above the noise", "effects with another law leave 1 to 4 % unexplained";
+    /// If the final model is above the noise level, effects are named under two conditions: they explain at least
+    /// this share of the unexplained variance, and the remaining error is below the rule `terms.much`. Otherwise
+    /// they are surrogates.
+    explained: f64 = 0.95, "share of the model error above the noise", "effects with an altered equation leave \
+         1 to 4 % unexplained";
     /// The same share where the noise level is unknown.
     explained_in_unknown_noise: f64 = 0.75, "share of the model error above the noise", "the public sets";
     /// Effects that explain less than this share of the unexplained variance are not named.
@@ -29,28 +32,31 @@ rules! {
     /// If the final model is above the noise level, effects that explain at least this share are reported as
     /// surrogates.
     stands_in: f64 = 0.25, "share of the model error above the noise", "judgement: nothing is claimed, but the written model has a smaller error";
-    /// An effect is certified beside an error that it does not explain if its certificate holds and it explains this
-    /// share of what the best model without it leaves.
-    certified_share: f64 = 0.7, "share of the model error above the noise", "of six surrogates on simulated rigs the four right ones took 0.72 to 1.00, two wrong ones 0.56 and 0.62";
-    /// An effect beside others is a surrogate if the interval of each of its positive parameters spans more than
-    /// this factor, or if its amplitude may be 0. A single effect on a base that fits is then not named.
-    identified: f64 = 100.0, "times", "judgement; a wrong hysteresis beside an edge-dependent delay spanned 180";
-    /// Where the level of slow noise is unknown, a model error counts if this share of it is a function of a
-    /// coordinate.
+    /// An effect is certified although another error remains if its e-value is large enough and it explains this
+    /// share of the variance that the best model without it leaves.
+    certified_share: f64 = 0.7, "share of the model error above the noise", "six surrogates on simulated rigs: \
+         the four right ones explained 0.72 to 1.00, the two wrong ones 0.56 and 0.62";
+    /// One of several effects is a surrogate if the interval of each of its positive parameters spans more than
+    /// this factor, or if the interval of its amplitude contains 0. A single effect is then not named if the base
+    /// model is adequate.
+    identified: f64 = 100.0, "times", "judgement; the interval of a wrong hysteresis beside an edge-dependent \
+         delay spanned a factor of 180";
+    /// Where the level of slow noise is unknown, a model error is significant if this share of it is a function of
+    /// a coordinate.
     depends: f64 = 0.1, "share of the model error above the noise", "the public sets";
-    /// Where the level of slow noise is unknown, a model error also counts if it is more than this share: no
-    /// recording worth fitting is so noisy.
+    /// Where the level of slow noise is unknown, a model error is also significant if it exceeds this share,
+    /// because no usable recording is so noisy.
     too_much: f64 = 0.06, "share of the variance of y", "the public sets";
-    /// Number of candidates refitted for the ranking, beside the named ones.
+    /// Number of candidates refitted for the ranking, in addition to the named ones.
     ranked_in_full: usize = 4, "", "judgement: lower-ranked candidates never became the best";
     /// From this number of `validate` records on, every third is set aside for an independent error estimate.
     enough_to_quote: usize = 4, "records", "judgement: at least three records are needed for the choice";
-    /// If a measured channel explains at least this cross-validated share of the error, something is missing
-    /// that depends on that channel.
+    /// If a measured channel explains at least this cross-validated share of the error, an effect of that channel
+    /// is reported as missing.
     follows_a_channel: f64 = 0.25, "share of the model error above the noise", "judgement: smallest share of a surrogate";
-    /// A lag below this belongs to the model order; it is not reported as a memory.
+    /// A lag shorter than this belongs to the model order and is not reported as a memory.
     shortest_memory: usize = SHORTEST_MEMORY, "samples", "judgement: time scale of a fast flow";
-    /// A net rate below this share of the dominant pole's is the difference of cancelling lags; the pole is
-    /// used instead.
+    /// If the net rate is below this share of the dominant pole's, it is a difference of lags that cancel; the pole
+    /// is used instead.
     cancelled: f64 = 0.01, "share of the rate", "judgement";
 }

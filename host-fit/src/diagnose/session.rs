@@ -21,7 +21,7 @@ pub(super) struct Session<'a> {
     pub(super) search: &'a Search<'a>,
     pub(super) units: Units,
     pub(super) options: &'a Options,
-    /// ln of the evidence of models, nats, as far as it was asked for.
+    /// ln of the evidence of models, nats, for those models that were compared so far.
     pub(super) evidences: Mutex<Vec<(Model, Option<f64>)>>,
 }
 
@@ -31,8 +31,8 @@ struct Way {
     order: Vec<&'static Spec>,
     /// One step for each effect, with those before it.
     rungs: Vec<Rung>,
-    /// Number of significant effects. Not counted: those that a second copy of another effect replaces, and those whose
-    /// parameters are not identifiable.
+    /// Number of significant effects. Effects that a second copy of another effect replaces, and effects whose
+    /// parameters are not identifiable, are not counted.
     proven: usize,
 }
 
@@ -65,9 +65,9 @@ impl Session<'_> {
         Rung::of(judge, units, &held_out, effects, step, Some(model))
     }
 
-    /// The given model's own structure, for users who chose lags and delays themselves. The product u·y is
-    /// added where it is missing and lowers the error: it belongs to the base class and never counts as a
-    /// missing effect.
+    /// The given model's own structure, for users who chose lags and delays themselves. The product u·y is added if
+    /// it is missing and lowers the error, because it belongs to the base class and never counts as a missing
+    /// effect.
     pub(super) fn root_of_given(
         &self,
         given: &Model,
@@ -105,7 +105,7 @@ impl Session<'_> {
     ) -> Diagnosis {
         let (search, judge, units) = (self.search, self.judge(), &self.units);
         let named = self.named(&found);
-        (search.progress)("what else it could be");
+        (search.progress)("testing equivalent candidates");
         let mut compared = self.compared(&named, &found);
         // One effect alone may give a smaller error than all effects found together.
         let alone = compared.best_alone();
@@ -161,7 +161,7 @@ impl Session<'_> {
                 (spec.name.to_owned(), estimates)
             })
             .collect();
-        (search.progress)("the evidence of the models");
+        (search.progress)("computing the evidence of the models");
         let subject = if !order.is_empty() {
             &last
         } else if !named.is_bare() {
@@ -289,8 +289,8 @@ impl Session<'_> {
         Compared { context, others }
     }
 
-    /// The ladder from no effect to `last`, one more of its `effects` at each step, the least important last.
-    /// Significance of each is tested only if effects are claimed.
+    /// The ladder from no effect to `last`, with one more of its `effects` at each step, the least important last.
+    /// The significance of each is tested only if effects are claimed.
     fn way(
         &self,
         last: &Hypothesis,
@@ -342,7 +342,8 @@ mod tests {
     use model_core::effects::spec;
     use std::sync::atomic::AtomicBool;
 
-    /// A drift is hidden; a vortex beside it has an amplitude that may be 0. The doubt is about the vortex.
+    /// A drift is hidden. A vortex in the same model has an amplitude whose interval contains 0. The uncertainty
+    /// must be attributed to the vortex.
     #[test]
     fn doubts_about_one_effect_are_no_doubts_about_another() {
         let mut records = records(&[], &[], 3);
@@ -388,7 +389,7 @@ mod tests {
         let names: Vec<&str> = claimed.effects.iter().map(|spec| spec.name).collect();
         assert_eq!(names, ["thermal-drift"]);
         assert_eq!(claimed.verdict, Verdict::EffectMissing);
-        // The verdict is on what is handed over: a given model at the noise level lacks nothing.
+        // The verdict refers to the resulting model: nothing is missing in a given model at the noise level.
         let verdict = |as_given: &HeldOut| session.concluded(&bare, &found, as_given).verdict;
         assert_eq!(verdict(as_given), Verdict::Unexplained);
         let drifts = &claimed.model.judged.held_out;

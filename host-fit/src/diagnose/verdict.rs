@@ -19,7 +19,7 @@ impl Session<'_> {
                 && !self.depends(judged))
     }
 
-    /// Whether an error is no more than the noise, by a test or within the uncertainty of a known level.
+    /// Whether an error does not exceed the noise, by a test or within the uncertainty of a known level.
     fn is_at_noise(&self, held_out: &HeldOut) -> bool {
         let judge = self.judge();
         judge.p_above_noise(held_out, RULES.floor_margin) >= RULES.level
@@ -28,7 +28,7 @@ impl Session<'_> {
     }
 
     /// Whether `lesser` with a second copy of one of its `effects` fits equally well as `best`, which has one
-    /// effect more. An effect whose law differs from the catalogue's looks like two of it.
+    /// effect more. An effect whose equation differs from the catalogue's can look like two copies of it.
     pub(super) fn does_as_well_twice(
         &self,
         effects: &[&'static Spec],
@@ -38,7 +38,7 @@ impl Session<'_> {
         let enough = (1.0 + RULES.worthwhile) * best.judged.rmse();
         effects.iter().any(|spec| {
             (self.search.progress)(&format!(
-                "a second {} in the place of another effect",
+                "testing a second {} instead of another effect",
                 spec.name
             ));
             let twice = self.search.again(lesser, spec, enough);
@@ -67,20 +67,20 @@ impl Session<'_> {
             .any(|place| place.explained_fraction > RULES.depends)
     }
 
-    /// The best hypothesis, without the effects that the evidence is against or that lags replace.
+    /// The best hypothesis, without effects that reduce the evidence or that lags replace.
     pub(super) fn named(&self, found: &Found) -> Hypothesis {
         self.without_what_lags_do(self.most_evident(found), &found.root)
     }
 
-    /// The best hypothesis, or, as long as there is more evidence for it, one that lacks one of its effects: refitted without
-    /// it, or the best of the search.
+    /// The best hypothesis, or one that lacks one of its effects as long as the latter has more evidence. That one
+    /// is refitted without the effect, or is the best of the search without it.
     fn most_evident(&self, found: &Found) -> Hypothesis {
         let mut best = found.best.clone();
         let Some(likelihood) = Likelihood::of(self.judge(), best.judged.model()) else {
             return best;
         };
         let evidence = |of: &Hypothesis| likelihood.evidence(of.judged.model());
-        // Validation records of a known noise level have a say of their own.
+        // If the noise level is known, the validation records decide as well.
         let scatter = self.judge().noise_source == NoiseSource::Scatter;
         let largest = (1.0 + RULES.worthwhile) * best.judged.rmse();
         let may_stand = |of: &Hypothesis| scatter || of.judged.rmse() <= largest;
@@ -108,9 +108,9 @@ impl Session<'_> {
         }
     }
 
-    /// `best` without the effects that additional lags replace equally well. Lags are searched anew beside
-    /// the other effects, since the present ones were found beside all of them. Skipped if the noise level is
-    /// unknown: the error then says too little.
+    /// `best` without the effects that additional lags replace equally well. Lags are searched again together with
+    /// the other effects, because the present lags were found with all effects in the model. Skipped if the noise
+    /// level is unknown, because the error is then not informative.
     fn without_what_lags_do(&self, mut best: Hypothesis, root: &Hypothesis) -> Hypothesis {
         if self.judge().noise_source == NoiseSource::Scatter {
             return best;
@@ -120,7 +120,7 @@ impl Session<'_> {
             let named = (0..best.terms.len()).filter(|i| best.terms[*i].effect().is_some());
             let lesser = named.filter_map(|index| {
                 let name = best.terms[index].name();
-                (self.search.progress)(&format!("lags in the place of {name}"));
+                (self.search.progress)(&format!("testing lags instead of {name}"));
                 let lesser = self.search.without(&best, index, root)?;
                 let is_effect = |term: &Term| term.effect().is_some();
                 let (kept, lags) = lesser.terms.into_iter().partition(is_effect);
@@ -157,7 +157,7 @@ impl Session<'_> {
         let bare = &found.bare;
         let effects: Vec<&'static Spec> = best.terms.iter().filter_map(Term::effect).collect();
         let judge = self.judge();
-        // Where the given model has the smallest error it is handed over, and the verdict is on it.
+        // If the given model has the smallest error, it is the result, and the verdict refers to it.
         let of_bare = || Conclusion {
             verdict: if self.fits(&bare.judged)
                 || (as_given.rmse() < bare.judged.rmse() && self.is_at_noise(as_given))
@@ -170,7 +170,7 @@ impl Session<'_> {
             effects: Vec::new(),
             p_value: None,
         };
-        // Effects on a base with a larger error than the given model explain nothing.
+        // Effects on a base model with a larger error than the given model explain nothing.
         let no_better = best.judged.rmse() >= as_given.rmse();
         if effects.is_empty() || no_better {
             return of_bare();

@@ -25,8 +25,8 @@ impl Candidate {
         }
     }
 
-    /// The curve or the formula, whichever has the smaller penalised error. A formula may win because
-    /// straight lines approximate a smooth function poorly.
+    /// The curve or the formula, whichever has the smaller penalised error. A formula may have the smaller error
+    /// because straight lines approximate a smooth function poorly.
     fn told(&self) -> (&Term, &Judged) {
         let curve = (&self.term, &self.with.judged);
         match &self.formula {

@@ -139,7 +139,7 @@ impl Coordinate {
         }
     }
 
-    /// Whether its memory is no longer than `longest`.
+    /// Whether its memory is at most `longest`.
     pub(super) fn fits(&self, longest: f64) -> bool {
         match self {
             Self::PastY(t) | Self::MeanY(t) | Self::Blowing(t) => *t <= longest,
@@ -205,13 +205,13 @@ impl Coordinate {
         }
     }
 
-    /// The state variables that it needs. The command counts as on above `on`; with `fitted`, its time
-    /// constant is a parameter.
+    /// The state variables that it needs. The command counts as on above `on`; with `fitted`, the time constant is
+    /// a parameter.
     pub(super) fn states(&self, on: f64, time: f64, fitted: bool) -> Vec<State> {
         let rises = format!("u > {on:?} && was_on < 0.5");
         let falls = format!("u <= {on:?} && was_on > 0.5");
         let long_ago = LONG_AGO_S * time;
-        // Must be updated last, so that the others see its value of the sample before.
+        // Must be updated last, so that the other states use its value of the previous sample.
         let was_on = || State {
             name: "was_on",
             start: 0.0,

@@ -48,8 +48,7 @@ impl Finder<'_> {
             looked_at += curves.len();
             let most = if index == 0 {
                 smallest = self.smallest(&curves);
-                // A first-order prediction underestimates the gain: half of the required gain is enough for a
-                // refit.
+                // A first-order prediction underestimates the gain: half of the required gain suffices for a refit.
                 let wanted = (1.0 - RULES.promised * RULES.worthwhile) * base.judged.rmse();
                 let left = |curve: &Screened| (1.0 - curve.held_out).max(0.0).sqrt();
                 curves.retain(|curve| left(curve) * beside.judged.rmse() < wanted);
@@ -72,7 +71,8 @@ impl Finder<'_> {
         }
     }
 
-    /// The same with more points where its curve is steepest, while they pay: a step lies between two points.
+    /// The same with more points where its curve is steepest, as long as they lower the error enough: a step may
+    /// lie between two points.
     fn finer(&self, candidate: Candidate) -> Candidate {
         let judge = self.search.judge;
         let mut last = candidate;
@@ -101,15 +101,15 @@ impl Finder<'_> {
         self.search.judge.over_noise(base.judged.rmse()) < RULES.near_the_floor
     }
 
-    /// Whether a term beside `base` may be reported. Near the noise level, a sensitivity or a drift over time
-    /// cannot be distinguished from record-to-record scatter.
+    /// Whether a term added to `base` may be reported. Near the noise level, a sensitivity or a drift over time is
+    /// not distinguishable from record-to-record scatter.
     fn may_be_told(&self, term: &Term, base: &Hypothesis) -> bool {
         let varies = term.entry == Entry::Sensitivity || term.coordinate == Coordinate::Time;
         !varies || !self.is_near_the_floor(base)
     }
 
-    /// Whether a term explains too little: less than the required share of the unexplained variance, or,
-    /// where record-to-record scatter may account for all of it, less than most of what the best base leaves.
+    /// Whether a term explains too little: less than the required share of the unexplained variance. If
+    /// record-to-record scatter may account for all of it, the share refers to the variance left by the best base.
     fn takes_too_little(&self, with: &Judged, without: &Judged, base: &Hypothesis) -> bool {
         let judge = self.search.judge;
         let may_scatter = self.moving_zero || self.is_near_the_floor(base);
@@ -148,7 +148,7 @@ impl Finder<'_> {
         number: usize,
     ) -> Option<Found> {
         let judge = self.search.judge;
-        (self.search.progress)(&format!("term {number}: what else it could be"));
+        (self.search.progress)(&format!("term {number}: testing equivalent candidates"));
         all.retain(|one| self.may_be_told(&one.term, base));
         let leader = best(&mut all)?;
         let without = self.without(&leader)?;
@@ -160,7 +160,7 @@ impl Finder<'_> {
         let near = context.near(&leader.term).into_iter();
         all.extend(self.refitted(&without, diverse(others, RULES.tried)));
         all.extend(self.refitted(&without, near.take(RULES.of_a_kind).collect()));
-        // A different candidate may fit best beside the final base.
+        // With the final base model a different candidate may fit best.
         all.push(leader);
         let found = self.finer(best(&mut all)?);
         let last = found.judged();
@@ -179,7 +179,7 @@ impl Finder<'_> {
             place: term.entry.place(),
             coordinate: coordinate_words(term.entry, term),
         };
-        // One coordinate may enter one place in two forms: they are reported as one finding.
+        // If one coordinate enters one place in two forms, they are reported as one finding.
         let same = |other: &Term| other.is_like(term) || told(other) == told(term);
         order::ascending(&mut all, Candidate::size);
         let held_out: Vec<&HeldOut> = std::iter::once(&found)

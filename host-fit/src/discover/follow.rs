@@ -1,5 +1,5 @@
-//! Refits of promising curves: the model is refitted with each, the flow's lags are searched again, and the
-//! term's coordinate is chosen again beside those lags.
+//! Refits of promising curves: the model is refitted with each curve, the flow's lags are searched again, and the
+//! term's coordinate is chosen again with those lags.
 
 use super::RULES;
 use super::candidate::{Candidate, best, best_of_each_place};
@@ -14,7 +14,7 @@ use crate::parallel;
 use crate::terms::{self, Hypothesis};
 use std::sync::atomic::Ordering;
 
-/// A term beside a base, fitted for a few iterations.
+/// A base model with a term, fitted for a few iterations.
 struct Tried {
     term: Term,
     brief: Fit,
@@ -30,9 +30,9 @@ fn kind(term: &Term, memory: &[terms::Term], model: &Model) -> Kind {
     (term.entry.place(), memory.len(), model.delay.effect_name())
 }
 
-/// Selection of candidates for further fitting: the leading ones, the best at each place, and the best beside
-/// each base. A brief fit ranks unfairly across base models, because a low-order base has further to go and a
-/// high-order one adapts to a wrong term.
+/// Selection of candidates for further fitting: the leading ones, the best at each place, and the best for each
+/// base. A brief fit does not rank base models fairly: a low-order base needs more iterations, and a high-order one
+/// has adapted to a wrong term.
 struct Heirs {
     free: usize,
     taken: Vec<Kind>,
@@ -62,7 +62,7 @@ impl Heirs {
 }
 
 impl Finder<'_> {
-    /// The fitted terms of some curves beside their models; only one if it is at the noise level.
+    /// The fitted terms of some curves, each in its model; only one if it is at the noise level.
     pub(super) fn followed(
         &self,
         curves: Vec<(&Hypothesis, Screened)>,
@@ -72,17 +72,17 @@ impl Finder<'_> {
         progress(&format!("term {number}: refitting {} curves", curves.len()));
         let tried = parallel::some(curves, |(beside, curve)| self.tried(beside, curve));
         let mut all = self.finished(tried);
-        progress(&format!("term {number}: the flow's lags beside it"));
+        progress(&format!("term {number}: searching the flow's lags again"));
         for candidate in self.leading(&mut all) {
             let with = self.search.run(candidate.with, None).best;
             let followed = Candidate::of(candidate.term, with);
-            // At the noise level nothing can be better; equivalent alternatives are sought later.
+            // At the noise level no candidate can be better; equivalent alternatives are searched later.
             if self.at_the_floor(&followed) {
                 return vec![followed];
             }
             all.push(followed);
         }
-        progress(&format!("term {number}: its coordinate beside these lags"));
+        progress(&format!("term {number}: choosing its coordinate again"));
         for index in best_of_each_place(&mut all) {
             let least = all.iter().map(Candidate::size);
             let least = least.fold(f64::INFINITY, f64::min);
@@ -114,9 +114,9 @@ impl Finder<'_> {
         judge.over_noise(candidate.with.judged.rmse()) < RULES.at_the_floor
     }
 
-    /// Candidates beside which the flow's lags are searched again: first those at the noise level and those
-    /// on the lowest-order base. On a high-order base the error is small with any term, because its lags
-    /// imitate the right one.
+    /// Candidates for which the flow's lags are searched again: first those at the noise level and those on the
+    /// lowest-order base. On a high-order base the error is small with any term, because its lags imitate the right
+    /// one.
     fn leading(&self, all: &mut [Candidate]) -> Vec<Candidate> {
         order::ascending(all, Candidate::size);
         let mut leading: Vec<Candidate> = Vec::new();
@@ -131,9 +131,9 @@ impl Finder<'_> {
         leading
     }
 
-    /// A term with its lags, fitted further: the coordinate is chosen again beside these lags, then the lags
-    /// beside the coordinate, while the error falls and remains within reach of the best. On a low-order base
-    /// a wrong coordinate may imitate missing lags.
+    /// A term with its lags, fitted further: the coordinate is chosen again with these lags, then the lags with the
+    /// coordinate. This continues while the error falls and remains within reach of the best. On a low-order base a
+    /// wrong coordinate may imitate missing lags.
     fn settled(&self, from: Candidate, least: f64, number: usize) -> Option<Candidate> {
         let reach = least + RULES.in_reach.ln();
         let (mut last, mut settled) = (from, None);
@@ -174,7 +174,7 @@ impl Finder<'_> {
         Some(without)
     }
 
-    /// The best of some curves beside one model.
+    /// The best of some curves for one model.
     pub(super) fn refitted(&self, beside: &Hypothesis, curves: Vec<Screened>) -> Vec<Candidate> {
         let tried = parallel::some(curves, |curve| self.tried(beside, curve));
         self.finished(tried)
@@ -201,7 +201,7 @@ impl Finder<'_> {
         from(term).or_else(|| from(&term.with_values(&nothing)))
     }
 
-    /// A curve beside a model, fitted for a few iterations.
+    /// A model with a curve, fitted for a few iterations.
     fn tried(&self, beside: &Hypothesis, curve: Screened) -> Option<Tried> {
         let model = beside.judged.model();
         // On/off commands do not identify the response to jets of part strength, which a term at the jet

@@ -81,7 +81,7 @@ const fn width(name: &'static str) -> Card {
     Card { name, kind }
 }
 
-/// The forms, from few to many parameters.
+/// The forms, in ascending number of parameters.
 pub(super) static FORMS: [Form; 14] = [
     Form {
         expression: "amplitude * {x}",

@@ -26,8 +26,8 @@ impl Finder<'_> {
         (told, current)
     }
 
-    /// A term as a formula if that is better than its curve: the residual of straight lines on a smooth
-    /// function must not be taken for a second term.
+    /// A term as a formula if that has a smaller error than its curve. Otherwise the residual of straight lines on
+    /// a smooth function could be reported as a second term.
     pub(super) fn better_as_formula(&self, found: &mut Found, current: &mut Hypothesis) {
         if let Some((term, judged)) = self.formula_of(found, current)
             && judged.size() < current.judged.size()

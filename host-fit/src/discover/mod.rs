@@ -2,10 +2,9 @@
 //! formula that fits equally well.
 //!
 //! Candidates are all entries (jet, delay, flow, sensor) times all coordinates defined there, each with a
-//! piecewise-linear curve. A first-order screening predicts the share of the free-run error that each
-//! explains beyond the base (diagnosis 7). The best are refitted with the whole model, the flow's lags are
-//! searched again, and the validation error decides. A term must beat the best base without it, tested over
-//! all screened curves.
+//! piecewise-linear curve. A first-order screening predicts the share of the free-run error that each explains
+//! beyond the base. The best are refitted with the whole model, the flow's lags are searched again, and the
+//! validation error decides. A term must beat the best base without it, tested over all screened curves.
 
 mod candidate;
 mod coordinate;
@@ -66,8 +65,8 @@ pub struct Glance {
     pub error_taken_percent: f64,
 }
 
-/// The most promising curve beside `model` without any refit: the first candidate of [`discover`]. `None` if
-/// no predicted gain is above the practical margin.
+/// The most promising curve for `model` without any refit: the first candidate of [`discover`]. `None` if no
+/// predicted gain is above the practical margin.
 #[must_use]
 pub fn glance(model: &Model, records: &[Record], interrupt: &AtomicBool) -> Option<Glance> {
     let bench = Bench::of(model, records)?;
@@ -81,8 +80,8 @@ pub fn glance(model: &Model, records: &[Record], interrupt: &AtomicBool) -> Opti
     })
 }
 
-/// The best base with at least one and at most half as many terms as the best: a high-order base has adapted
-/// to the missing term, and the lowest-order one is too far from the flow.
+/// The best base with at least one and at most half as many terms as the best one. A high-order base has adapted to
+/// the missing term, and the lowest-order one is too far from the flow.
 fn halfway(found: &Searched) -> Option<Hypothesis> {
     let most = found.best.terms.len() / 2;
     let all = found.all.iter();
@@ -92,8 +91,8 @@ fn halfway(found: &Searched) -> Option<Hypothesis> {
         .cloned()
 }
 
-/// Searches for terms missing from the model `handed_in` on `records`. Without a finding, that model or a
-/// better base is returned. `progress` receives messages.
+/// Searches for terms missing from the model `handed_in` on `records`. Without a finding, that model or a better
+/// base is returned. `progress` receives messages.
 ///
 /// # Errors
 /// [`DiagnoseError`].
@@ -143,7 +142,8 @@ pub fn discover(
     let given = search.second_root(&bench.given, &root);
     let refitted = || Some(Hypothesis::new(judge.refitted(&bench.given).ok()?));
     let given = given.or_else(refitted);
-    // The catalogue's delay laws are no discovery: a base without the right law imitates it.
+    // The delay laws of the catalogue do not count as discoveries, because a base without the right law imitates
+    // it.
     let after_another_law = |base: &Hypothesis| search.after_another_law(base, &options.without);
     let leanest: Vec<Hypothesis> = [after_another_law(&root), Some(root.clone())]
         .into_iter()
@@ -166,7 +166,7 @@ pub fn discover(
     let mut found = Vec::new();
     let mut smallest = None;
     let mut looked_at = 0;
-    // A term describes how the response depends on a coordinate, which few records hardly show.
+    // A term describes how the response depends on a coordinate; few records hardly identify such a dependence.
     let most = match says_little(records) {
         Some(_) => 0,
         None => options.terms,
@@ -193,7 +193,8 @@ pub fn discover(
             break;
         }
     }
-    // Compared on the base that the first term needs: the best base without it may imitate the term.
+    // Compared on the base model that belongs to the first term, because the best base without it may imitate the
+    // term.
     let lacking = found.first().map_or(&base.judged, |found| &found.without);
     let trace = missing(lacking.rmse())
         .then(|| {

@@ -105,8 +105,8 @@ pub struct Discovery {
     pub noise_estimate: f64,
     /// Number of curves screened.
     pub looked_at: usize,
-    /// At each place, the signal that would explain the error of the base without the first term, or of the
-    /// best base if none was found; none if no error remains.
+    /// At each place, the signal that would explain the error of the base without the first term. If no term was
+    /// found, the base is the best one. `None` if no error remains.
     pub trace: Option<Trace>,
     /// The command that would distinguish the first ambiguous term from its alternatives.
     pub separation: Option<Separation>,

@@ -6,12 +6,12 @@ rules! {
     /// When a term outside the catalogue is reported, and how its curve is drawn.
     pub struct Rules in "discover";
 
-    /// Most points of a curve; they lie where the coordinate spends equal times.
-    points: usize = 8, "", "judgement: number of derivatives per run";
+    /// Most points of a curve; equal times are spent between neighbouring points.
+    points: usize = 8, "", "judgement: limits the derivatives per run";
     /// A coordinate with fewer distinct points than this is not screened.
-    fewest_points: usize = 3, "", "judgement: two points are a line at best";
-    /// Points inserted in one round where a curve is steepest, if they pay.
-    inserted: usize = 3, "", "judgement: a step is found four times as closely";
+    fewest_points: usize = 3, "", "judgement: a curve needs more than the two points of a line";
+    /// Points inserted in one round where a curve is steepest, if they lower the error enough.
+    inserted: usize = 3, "", "judgement: a step is located four times as closely";
     /// Rounds of inserting points.
     refinements: usize = 2, "rounds", "judgement";
     /// Most points of a curve after insertion.
@@ -20,25 +20,27 @@ rules! {
     beyond: f64 = 0.01, "share of the samples", "judgement";
     /// Least distance of two points.
     apart: f64 = 0.05, "of the way from the first point", "judgement: rests and times since edges span three decades";
-    /// A curve is refitted if its predicted gain is this share of the practical margin.
-    promised: f64 = 0.5, "share", "judgement: the first-order gain is smaller than that of a refit";
+    /// A curve is refitted if its predicted gain is at least this share of the practical margin.
+    promised: f64 = 0.5, "share", "judgement: the first-order gain is smaller than the gain after a refit";
     /// Curves that are fitted for a few iterations per round.
     tried: usize = 10, "", "judgement";
-    /// The same beside each base of lower order than the best.
+    /// The same number for each base of lower order than the best.
     tried_leaner: usize = 4, "", "judgement";
-    /// At most so many of them have the same place and kind of coordinate.
+    /// At most this many of them have the same place and kind of coordinate.
     of_a_kind: usize = 2, "", "judgement: memories of neighbouring lengths have similar gains";
-    /// Curves refitted in full, beside the best of each place and each base.
+    /// Curves refitted in full, in addition to the best of each place and each base.
     finished: usize = 4, "", "judgement";
-    /// Candidates for which the flow's lags are searched again, beside the best of each place and each base.
+    /// Candidates for which the flow's lags are searched again, in addition to the best of each place and each
+    /// base.
     settled: usize = 2, "", "judgement: each takes as long as `identify`";
-    /// Rounds of choosing the coordinate of the best candidate at a place again beside its lags.
-    rounds: usize = 2, "", "judgement: the second round has found nothing new so far";
-    /// A candidate is followed in those rounds if its error is within this factor of the best.
-    in_reach: f64 = 1.5, "times the best error", "judgement: with its lags a hot jet improved from 1.5 to 1.05 × the noise level";
-    /// The best candidate of a place is compared as a formula too if its error is within this factor of the
-    /// best.
-    contends: f64 = 1.5, "times the best error", "for a quadratic term the curve had 1.066 × the noise level, a wrong place 1.025";
+    /// Rounds in which the coordinate of the best candidate of a place is chosen again with its lags.
+    rounds: usize = 2, "", "judgement: the second round never found anything new";
+    /// A candidate takes part in those rounds if its error is within this factor of the best.
+    in_reach: f64 = 1.5, "times the best error", "judgement: after its lags were searched, a hot jet improved \
+         from 1.5 to 1.05 × the noise level";
+    /// The best candidate of a place is also compared as a formula if its error is within this factor of the best.
+    contends: f64 = 1.5, "times the best error", "with a quadratic term the curve had 1.066 × the noise level, \
+         and a curve at a wrong place 1.025";
     /// A model within this factor of the noise level gets no further term.
     at_the_floor: f64 = 1.02, "times the noise level", "a wrong sensor term had 1.09 × the noise level, the true jet term 1.05 as a curve";
     /// Curves at one place whose errors differ by less than this are the same curve.
@@ -47,10 +49,10 @@ rules! {
     worthwhile: f64 = 0.015, "share of the rms error", "as for effects of the catalogue";
     /// If the noise level is known, a term must explain this share of the unexplained variance.
     least_share: f64 = 0.25, "share of the model error above the noise", "as for the surrogates of `diagnose`; on a drifting rig a wrong delay term explained 19 %";
-    /// A base below this factor is near the noise level: a term must then explain `most_of_it`, and
-    /// sensitivity and time in the record are not reported, because record-to-record scatter and drift look
-    /// like them.
-    near_the_floor: f64 = 1.10, "times the noise level", "null cases of nine families stay below it";
+    /// A base model below this factor is near the noise level. A term must then explain the share `most_of_it`. A
+    /// sensitivity, or a dependence on the time in the record, is then not reported, because record-to-record
+    /// scatter and drift look like them.
+    near_the_floor: f64 = 1.10, "times the noise level", "cases without a term in nine families stay below it";
     /// Share of the unexplained variance that a term must explain near the noise level, and wherever the
     /// sensor has a record-to-record offset.
     most_of_it: f64 = 0.75, "share of the model error above the noise", "curves that imitate an offset drift explained 50 to 70 %, true terms at least 80 % in 16 of 17 cases";
@@ -62,19 +64,19 @@ rules! {
     stable: f64 = 0.9, "share of the resamples", "judgement";
     /// Validation errors that differ by less than this are equal in practice.
     alike: f64 = 0.01, "share of the rms error", "judgement: twice the margin of effects, because a curve has more freedom";
-    /// A formula may have this much more error than the curve it replaces.
+    /// The error of a formula may exceed that of the curve it replaces by this much.
     formula: f64 = 0.01, "share of the rms error", "judgement";
     /// An effect of the catalogue resembles a curve if their changes of the free run correlate at least so
     /// much.
     resembles: f64 = 0.9, "", "judgement";
     /// Most knots of a trace per record.
-    knots: usize = 100, "", "judgement: for the time it takes";
-    /// Weight of smallness against smoothness in the prior of a trace.
+    knots: usize = 100, "", "judgement: limits the time";
+    /// Weight of the size against the curvature in the prior of a trace.
     smallness: f64 = 0.01, "", "judgement: the bend over ten knots has the same weight as the size";
-    /// A place is reported from this posterior probability on.
+    /// A place is reported if its posterior probability is at least this.
     likely: f64 = 0.9, "probability", "convention";
-    /// Most by which a delay may be lengthened.
-    longest_delay_s: f64 = 0.1, "s at 1 kHz", "judgement: three times the delays of the rigs at hand";
+    /// Longest extension of a delay.
+    longest_delay_s: f64 = 0.1, "s at 1 kHz", "judgement: three times the delays of the simulated rigs";
     /// A filter time constant is fitted with a curve within this factor of its grid value.
     time_of_a_curve: f64 = 1.7, "", "half a grid step; with a larger range a memory of y shrinks to y itself";
     /// A filter time constant is fitted with a formula within this factor.

@@ -1,4 +1,4 @@
-//! First-order screening of curves: every entry times every coordinate, beside everything that the base can
+//! First-order screening of curves: every entry times every coordinate, orthogonal to everything that the base can
 //! imitate.
 
 use super::RULES;
@@ -17,8 +17,8 @@ use model_core::effects::ZERO_OFFSET;
 pub(super) struct Screened {
     /// The term with the predicted values.
     pub(super) term: Term,
-    /// ½ ln of the predicted validation mean square over the present one, plus the penalty of its points;
-    /// negative if it pays.
+    /// ½ ln of the predicted validation mean square over the present one, plus the penalty of its points; negative
+    /// if the gain exceeds the penalty.
     pub(super) score: f64,
     /// Explained share of the validation error energy.
     pub(super) held_out: f64,
@@ -41,7 +41,7 @@ const SHOWN: usize = 20_000;
 /// The values of a coordinate over the records in a run of the model; `None` if it is not defined there.
 fn values_of(coordinate: &Coordinate, model: &Model, records: &[&Record]) -> Option<Vec<Vec<f64>>> {
     let mut probe = model.clone();
-    // The offset acts after the probe and would be added to it.
+    // The sensor's offset acts after the probe and would be added to it.
     probe.effects.retain(|added| added.name != ZERO_OFFSET.name);
     let mut text = format!(
         "name = \"probe-of-a-coordinate\"\nplace = \"sensor\"\nsummary = \"a coordinate\"\nexpression = \"{}\"\n",
@@ -90,8 +90,8 @@ fn points(mut weighted: Vec<(f64, f64)>) -> Option<(Vec<f64>, usize)> {
     if high - low <= 1e-6 * low.abs().max(high.abs()).max(1e-6) {
         return None;
     }
-    // Rests of a fraction of a second and of ten seconds occur together: the least distance of points is
-    // relative to the position.
+    // Rests of a fraction of a second and of ten seconds occur together, so the least distance of points is
+    // relative to their position.
     let least = (0.01 * (at(0.5) - low)).max(1e-6 * (high - low));
     let count = RULES.points;
     let are_apart = |a: f64, b: f64| b - a > (RULES.apart * (a - low)).max(least);
@@ -103,7 +103,7 @@ fn points(mut weighted: Vec<(f64, f64)>) -> Option<(Vec<f64>, usize)> {
             x.push(place);
         }
     }
-    // A rest that is constant throughout a record spans several quantiles; values between get points too.
+    // A rest that is constant throughout a record covers several quantiles; the values between them get points too.
     let from = |x: f64| weighted.partition_point(|(own, _)| *own <= x);
     let to = |x: f64| weighted.partition_point(|(own, _)| *own < x);
     let before = |index: usize| index.checked_sub(1).map_or(0.0, |last| up_to[last]);
@@ -185,7 +185,7 @@ impl<'a> Context<'a> {
         self.curves(all, entries)
     }
 
-    /// A coordinate with its time constant multiplied by each factor, where the records are long enough.
+    /// A coordinate with its time constant multiplied by each factor, if the records are long enough.
     fn times(&self, coordinate: &Coordinate, factors: &[f64]) -> Vec<Coordinate> {
         let longest = remembered(self.longest);
         let others = factors
@@ -231,7 +231,7 @@ impl<'a> Context<'a> {
         curves
     }
 
-    /// Applies a function to every curve that the records define, with the model that contains it.
+    /// Applies a function to every curve that is defined on the records, with the model that contains it.
     fn each<T: Send>(
         &self,
         coordinates: Vec<Coordinate>,
@@ -332,8 +332,8 @@ pub(super) fn diverse(all: Vec<Screened>, most: usize) -> Vec<Screened> {
 mod tests {
     use super::*;
 
-    /// Square waves have one rest duration; the durations of random commands between get points too, and
-    /// unused ranges get none.
+    /// Square waves have one rest duration. The durations that random commands add get points too; unused ranges
+    /// get none.
     #[test]
     fn points_lie_between_rests_that_take_most_of_the_time() {
         let mut shown = vec![(0.05, 1.0); 4000];

@@ -109,7 +109,7 @@ struct Explained {
     /// Variance per independent error.
     variance: f64,
     strength: f64,
-    /// Posterior precision (Cholesky factor) of the model's own parameters beside w, and their changes.
+    /// Posterior precision (Cholesky factor) of the model's own parameters given w, and their changes.
     own: Cholesky,
     change: Vec<f64>,
 }
@@ -201,7 +201,7 @@ fn with_signal(entry: Entry, model: &Model, knots: &[f64]) -> Option<Model> {
     let shift = room(entry, model);
     let longest = shift + RULES.longest_delay_s;
     let mut text = format!(
-        "name = \"trace\"\nplace = \"{}\"\nsummary = \"what is missing\"\nexpression = \"{}\"\n",
+        "name = \"trace\"\nplace = \"{}\"\nsummary = \"the missing signal\"\nexpression = \"{}\"\n",
         entry.of_effect(),
         entry.expression(&table, shift, longest, 2.0 * ON)
     );

@@ -18,7 +18,7 @@ impl Openings {
         let mut u = Vec::with_capacity(samples);
         let mut level = 0.0;
         for dwell in &self.dwells {
-            // Rounded up: never shorter than the valve's limit.
+            // Rounded up, so that it is never shorter than the valve's limit.
             let length = (dwell / period - 1e-6).ceil().max(0.0) as usize;
             u.extend(std::iter::repeat_n(level, length.min(samples - u.len())));
             level = 1.0 - level;
@@ -85,7 +85,7 @@ pub(super) fn families(limits: &Limits, rng: &mut ChaCha8Rng) -> Vec<Openings> {
     let long = RULES.longest_of_pair * duration;
     let rest = long.max(off);
     let [firsts, seconds, pauses] = RULES.pairs;
-    // The range is non-empty even if the shortest times are long.
+    // The range is not empty even if the shortest times are long.
     for first in geometric(on, long.max(1.01 * on), firsts) {
         for second in geometric(on, long.max(1.01 * on), seconds) {
             let dwells: Vec<f64> = geometric(off, rest.max(1.01 * off), pauses)

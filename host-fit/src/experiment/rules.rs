@@ -8,7 +8,7 @@ rules! {
 
     /// A command discriminates two models if their free runs differ by at least this.
     distinguishes: f64 = 3.0, "standard deviations of the noise", "convention";
-    /// Rest at the end of a run, so that runs can follow each other.
+    /// Rest at the end of a run, after which the next run can follow.
     rest: f64 = 0.15, "share of the run", "judgement";
     /// Number of periods of square waves that are tried.
     periods: u32 = 14, "", "judgement";

@@ -16,8 +16,9 @@ pub struct Separation {
 }
 
 impl Separation {
-    /// The command that discriminates the first of `models` from the others within the default [`Limits`], at
-    /// a noise level of `noise_rmse` (y, 0 or more); `None` if there are no others, or no command does.
+    /// The command that discriminates the first of `models` from the others within the default [`Limits`], at a
+    /// noise level of `noise_rmse` (y, 0 or more). `None` if there are no others, or if no command discriminates
+    /// them.
     #[must_use]
     pub fn of(
         models: Vec<Model>,

@@ -62,12 +62,13 @@ pub fn fit_with_effect(
         .map(|parameters| with(base, parameters))
         .collect();
     if spec.parameters.is_empty() {
-        // A minimum without the effect may be a bad start for the model with it: fresh starts are tried too.
+        // A minimum without the effect may be a bad starting point for the model with it, so fresh starting points
+        // are tried too.
         let fresh = fresh_starts(base, records);
         models.extend(fresh.iter().map(|base| with(base, &[])));
     }
     if base.measured_inputs().any(|input| input.name == spec.name) {
-        // A base that had to do without an input has a wrong delay and time constant.
+        // A base model fitted without an input has a wrong delay and time constant.
         let few = starts(base, spec, records);
         let few = few.iter().step_by((few.len() / RULES.input_starts).max(1));
         let fresh = fresh_starts(base, records);
@@ -101,7 +102,7 @@ pub fn fit_with_effect(
             return with_law_of(&start.model, base, records).ok();
         }
         let fitted = fit(&start.model, records, options).ok()?;
-        // A fixed delay has no derivative, and that of the base may imitate the effect.
+        // A fixed delay has no derivative, and the base's delay may imitate the effect.
         settle_fixed_delay(fitted, records, options).ok()
     });
     finished
@@ -112,8 +113,8 @@ pub fn fit_with_effect(
         })
 }
 
-/// Several starting points after a few iterations each, best first. Fewer iterations would rank thresholds
-/// poorly, because parameters that act in steps converge slowly.
+/// Several starting points after a few iterations each, best first. Fewer iterations would rank thresholds poorly,
+/// because stepwise parameters converge slowly.
 fn tried_briefly(models: Vec<Model>, records: &[&Record], options: &FitOptions) -> Vec<Fit> {
     let brief = FitOptions {
         iterations: RULES.brief,

@@ -26,7 +26,7 @@ pub(super) fn covariance(parts: &[Part], information: &[f64], n: usize) -> Optio
     let [mut covariance, longer] = each;
     let wider = |i: usize| {
         let own = covariance[i * n + i];
-        // Where the jackknife is undefined (NaN), it does not count.
+        // An undefined jackknife variance (NaN) is ignored.
         let most = own.max(longer[i * n + i]).max(left_out[i]);
         (most / own.max(f64::MIN_POSITIVE)).sqrt()
     };
@@ -151,8 +151,8 @@ mod tests {
         };
         let parts: Vec<Part> = (0..8).map(part).collect();
         let variance = jackknife(&parts, &[32_000.0], 1)[0];
-        // Eight draws with standard deviation 0.1: the mean has the standard error 0.1/√7, widened by
-        // Student's t with 7 degrees of freedom.
+        // Eight draws with standard deviation 0.1: the mean has the standard error 0.1/√7, multiplied by Student's
+        // t with 7 degrees of freedom.
         let wider: f64 = 2.3646 / 1.96;
         assert!(
             (variance / (0.01 / 7.0) - wider * wider).abs() < 1e-3,
@@ -162,7 +162,7 @@ mod tests {
         assert!((counts[0] / variance - 1.0).abs() < 1e-9, "{counts:?}");
     }
 
-    /// A coordinate that only one record identifies gets its interval from blocks; one that no record
+    /// A coordinate that only one record identifies gets its interval from blocks. A coordinate that no record
     /// identifies gets none.
     #[test]
     fn what_one_record_alone_tells_has_an_interval_all_the_same() {
@@ -223,8 +223,7 @@ mod tests {
                 held[i] += usize::from(found[i].abs() <= 1.96 * covariance[3 * i].sqrt());
             }
         }
-        // Binomial(300, 0.95): 285 ± 3.8. Blocks mistake the levels for noise, which widens the interval of
-        // the wave.
+        // Binomial(300, 0.95): 285 ± 3.8. Blocks count the levels as noise, which widens the interval of the wave.
         let [mean, wave] = held;
         assert!(
             (274..=296).contains(&mean) && wave >= 274,

@@ -1,5 +1,5 @@
-//! Restarts of free runs for integrating plants: their free run drifts, and an error over a whole record
-//! would measure the drift of that record rather than the plant.
+//! Restarts of free runs for integrating plants. Their free run drifts, so an error over a whole record would
+//! measure the drift of that record instead of the plant.
 
 use super::rules::RULES;
 use crate::data::Record;
@@ -26,8 +26,8 @@ fn remembers(model: &Model, samples: usize) -> bool {
         .is_ok_and(|pole| left(pole) > RULES.drifts)
 }
 
-/// A record cut into pieces of so many scored samples. Each piece is preceded by samples in which the run
-/// follows the measurement; the remainder belongs to the last piece.
+/// A record cut into pieces of this many scored samples. Each piece is preceded by samples in which the run follows
+/// the measurement; the remainder belongs to the last piece.
 pub(crate) fn pieces(record: &Record, samples: usize) -> Vec<Record> {
     let count = (record.len() / samples.max(1)).max(1);
     let end = |piece: usize| {
@@ -69,7 +69,7 @@ mod tests {
     fn an_integrator_drifts_and_a_damped_rig_does_not() {
         let y = vec![0.0; 2000];
         let records = [Record::new("a", Use::Identify, 0.001, y.clone(), y)];
-        // A double pole at 1, and one at 1 beside a fast one.
+        // A double pole at 1, and one at 1 together with a fast one.
         for a in [[2.0, -1.0], [1.9, -0.9]] {
             assert!(restart_after(&model(a), &records).is_some(), "{a:?}");
         }

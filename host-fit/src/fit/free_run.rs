@@ -1,5 +1,5 @@
-//! Fits to the free-run error ε of eq. (9): exact sensitivities by dual numbers for smooth parameters,
-//! secants for parameters that act in steps, and standard errors robust to correlated residuals.
+//! Fits to the free-run error ε of eq. (9): exact sensitivities by dual numbers for smooth parameters, secants for
+//! stepwise ones, and standard errors robust to correlated residuals.
 
 use super::covariance::covariance;
 use super::level_scatter::LevelScatter;
@@ -14,8 +14,8 @@ use model_core::effect::Sign;
 use model_core::{Output, Real, pairs};
 use std::ops::ControlFlow;
 
-/// Lanes of a run, one of them for the value: those of the first runs, and of the last one the fewest that are enough for
-/// all remaining derivatives.
+/// Lanes of a run, one of them for the value. The last run uses the fewest lanes that suffice for the remaining
+/// derivatives.
 const FEW: usize = 8;
 const SOME: usize = 12;
 const MANY: usize = 20;
@@ -98,7 +98,7 @@ struct Searched {
     logarithmic: bool,
     low: f64,
     high: f64,
-    /// Half width of the secant, for coordinates that act in steps.
+    /// Half width of the secant, for stepwise coordinates.
     secant: Option<f64>,
     /// Index of a coordinate that changes by the opposite amount, so that their sum stays constant.
     against: Option<usize>,
@@ -310,7 +310,7 @@ fn derivatives_at_once<const N: usize>(
         }
     }
     let mut y = Vec::with_capacity(signals.u.len());
-    // A clone of an empty vector has no room.
+    // The clone of an empty vector has no capacity.
     let mut columns: Vec<Vec<f64>> = slopes
         .iter()
         .map(|_| Vec::with_capacity(signals.u.len()))
@@ -340,7 +340,7 @@ impl LeastSquares for FreeRunProblem<'_> {
         let each = |record: usize| {
             let (measured, lead) = (self.measured[record], self.lead[record]);
             let (mut sum, mut product, mut square) = (0.0, 0.0, 0.0);
-            // The part of the error along y is known only at the end of the record.
+            // The component of the error along y is known only at the end of the record.
             let enough = match self.level_scatter {
                 Some(_) => f64::MAX,
                 None => enough,
@@ -510,7 +510,7 @@ fn in_values(searched: &[f64], axes: &[Searched], values: &[f64]) -> Vec<f64> {
         Some(index) if axes[i].index == index => -1.0,
         _ => 0.0,
     };
-    // Only what a coordinate depends on is summed: an unknown variance is NaN, and 0 · NaN is NaN.
+    // Only terms with a non-zero factor are summed: an unknown variance is NaN, and 0 · NaN is NaN.
     let along = |i: usize, value: &dyn Fn(usize) -> f64| -> f64 {
         let own = (0..n).map(|k| (k, slope(i, k)));
         let own = own.filter(|(_, slope)| *slope != 0.0);
@@ -524,9 +524,9 @@ fn in_values(searched: &[f64], axes: &[Searched], values: &[f64]) -> Vec<f64> {
     cells.map(|(i, j)| along(j, &|k| half[i * n + k])).collect()
 }
 
-/// The coordinate that changes against the one with index `index`: a_1 against every other a_i. On
-/// oversampled plants the sum of the a_i is determined to many more digits than their differences; damping in
-/// proportion to the sum would freeze the differences.
+/// The coordinate that is changed in the opposite direction to the one with index `index`: a_1 for every other a_i.
+/// On oversampled plants the sum of the a_i is determined to many more digits than their differences. Damping in
+/// proportion to the sum would therefore freeze the differences.
 fn held_sum(model: &Model, index: usize) -> Option<usize> {
     // The constant comes before a_1.
     (2..=model.a.len()).contains(&index).then_some(1)
@@ -570,7 +570,7 @@ mod tests {
         assert!(fitted.standard_error(1).is_some_and(|error| error < 1e-4));
     }
 
-    /// A limit that no reading reaches is unknown; all else is known.
+    /// A limit that no reading reaches is not identifiable; all other parameters are.
     #[test]
     fn an_unknown_coordinate_takes_no_other_interval_with_it() {
         let u: Vec<f64> = (0..6000)
@@ -603,8 +603,8 @@ mod tests {
         }
     }
 
-    /// A fixed delay is a whole number of samples at the start, where the free run has a kink; its derivative
-    /// must not be 0.
+    /// A fixed delay is a whole number of samples at the start, where the free run has a kink; its derivative must
+    /// not be 0 there.
     #[test]
     fn a_delay_leaves_the_whole_sample_that_it_set_out_from() {
         let u: Vec<f64> = (0..3000)

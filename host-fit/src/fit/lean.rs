@@ -1,7 +1,7 @@
 //! The base model of the lowest order: bilinear, one lag each, one input.
 //!
-//! A high-order model imitates slow effects: 18 free coefficients leave a twentieth of a plenum's droop
-//! visible (theory 4.2). The lowest-order model cannot imitate, so that a missing effect stays visible in its
+//! A high-order model imitates slow effects: with 18 free coefficients a twentieth of a plenum's droop remains
+//! visible (theory 4.2). The lowest-order model cannot imitate it, so a missing effect stays visible in its
 //! residual.
 
 use super::rules::RULES;
@@ -17,7 +17,7 @@ use model_core::recursion::{Grading, LagConvention};
 /// with the kind of delay law that `given` has.
 ///
 /// # Errors
-/// When no starting point gives a stable free run.
+/// If no starting point gives a stable free run.
 pub fn lean_base(given: &Model, records: &[&Record]) -> Result<Fit, SimulateError> {
     let starts = fresh_starts(given, records);
     let brief = FitOptions {
@@ -118,7 +118,7 @@ pub fn settle_fixed_delay(
         iterations: RULES.settling,
         ..*options
     };
-    // A record that starts in mid-run is scored after the longest delay only.
+    // A record that starts in mid-run is scored only after the longest delay.
     let shortest = records.iter().map(|r| r.len()).min().unwrap_or(0);
     let most = i32::try_from(shortest / 4).unwrap_or(i32::MAX);
     for step in RULES.delay_steps.map(|step| step as i32) {
@@ -180,7 +180,7 @@ pub(super) fn with_law_of(
             delay,
             ..model.clone()
         };
-        // A law with which the free run diverges is no starting point.
+        // A law with which the free run diverges is not a starting point.
         fit(&model, records, &FitOptions::default()).ok()
     });
     let best = tried

@@ -1,9 +1,9 @@
-//! Scatter of the level between repeats: operating conditions never repeat exactly, and an average over
-//! repeats retains part of that scatter throughout its record.
+//! Scatter of the level between repeats. Operating conditions never repeat exactly, and an average over repeats
+//! keeps part of that scatter throughout its record.
 //!
-//! Standard errors that grow with y reveal it: σ² = A + B·y². Noise that is merely stronger at a high level
-//! gives the same B in every record, because each record has many independent samples of it. Scatter drawn
-//! once per repeat gives only as many samples as there are repeats, so that B varies from record to record.
+//! Standard errors that grow with y reveal it: σ² = A + B·y². Noise that is stronger at a high level gives the same
+//! B in every record, because each record has many independent samples of it. Scatter between repeats has only as
+//! many samples as there are repeats, so B varies from record to record.
 //!
 //! The error of a record is then g·y + noise with one random g. Generalised least squares weights the
 //! component along y by the scatter's variance: that component of errors and derivatives is shrunk before
@@ -23,7 +23,7 @@ pub struct LevelScatter {
 }
 
 impl LevelScatter {
-    /// Estimated from the standard errors of `records`; none if the level does not scatter or they do not
+    /// Estimated from the standard errors of `records`; `None` if the level does not scatter or the records do not
     /// show it.
     #[must_use]
     pub fn of(records: &[Record]) -> Option<Self> {

@@ -1,13 +1,13 @@
 //! Levenberg–Marquardt with bounds, on sums of squares that come in parts.
 //!
-//! Damping by the diagonal of JᵀJ (Marquardt 1963). A coordinate that would leave its bounds is held there
-//! and the others are solved again. A [`LeastSquares`] problem is linearised one part (record) at a time, so
-//! that parts run in parallel and a cost that is too high is abandoned early.
+//! Damping by the diagonal of JᵀJ (Marquardt 1963). A coordinate that would leave its bounds is held there, and the
+//! others are solved again. A [`LeastSquares`] problem is linearised one part (record) at a time. Parts run in
+//! parallel, and a run with too high a cost is stopped early.
 
 use super::rules::RULES;
 use crate::linalg::{dots, gram, solve_symmetric};
 
-// These constants change the number of iterations, not the minimum, and are therefore no rules.
+// These constants change the number of iterations, not the minimum, and are therefore not rules.
 
 /// First damping, as a share of the diagonal of JᵀJ.
 const FIRST_DAMPING: f64 = 1e-3;
@@ -36,8 +36,8 @@ pub enum FitStop {
     NothingToFit,
     /// The iteration limit was reached.
     IterationLimit,
-    /// No step lowers the sum of squares although its gradient is not 0: it is rougher than its derivatives
-    /// indicate.
+    /// No step lowers the sum of squares although its gradient is not 0: the function is rougher than its
+    /// derivatives indicate.
     NoDescent,
     /// The derivatives grow without bound.
     Diverged,
@@ -59,14 +59,16 @@ impl FitStop {
         match self {
             Self::Converged => "converged",
             Self::Stationary => "at a minimum",
-            Self::NothingToFit => "nothing is free to be fitted",
+            Self::NothingToFit => "there are no free parameters to fit",
             Self::IterationLimit => {
                 "stopped at the iteration limit: more iterations may lower the error further"
             }
             Self::NoDescent => {
-                "stopped where no step lowers the error, short of a minimum of its linearisation"
+                "stopped because no step lowers the error, before a minimum of its linearisation"
             }
-            Self::Diverged => "stopped where the sensitivities of the free run grow without bound",
+            Self::Diverged => {
+                "stopped because the sensitivities of the free run grow without bound"
+            }
         }
     }
 }

@@ -1,12 +1,11 @@
-//! Where the search of an effect's parameters sets out: what its card says, for
-//! these records and this model.
+//! Starting values of the search of an effect's parameters: those of its card, for these records and this model.
 
 use super::rules::RULES;
 use crate::data::Record;
 use crate::model::Model;
 use model_core::effect::{Facts, Spec, StartValue, Starts};
 
-/// The size of a signal: 1 where it is of order 1, as the catalogue's ranges are.
+/// The size of a signal: 1 if it is of order 1, for which the catalogue's ranges are valid.
 fn size_of(records: &[&Record], signal: impl Fn(&Record) -> &[f64]) -> f64 {
     let values = records.iter().flat_map(|record| signal(record));
     let size = values.fold(0.0, |size: f64, value| size.max(value.abs()));
@@ -17,7 +16,7 @@ fn size_of(records: &[&Record], signal: impl Fn(&Record) -> &[f64]) -> f64 {
     }
 }
 
-/// What the records say, for ranges and starting values.
+/// Properties of the records from which ranges and starting values are computed.
 #[derive(Clone, Debug)]
 pub struct Known {
     sorted_y: Vec<f64>,
@@ -27,7 +26,7 @@ pub struct Known {
 }
 
 impl Known {
-    /// Of records in the units in which models are fitted.
+    /// Computes them for records in the units in which models are fitted.
     #[must_use]
     pub fn of(records: &[&Record]) -> Self {
         let mut sorted_y: Vec<f64> = records.iter().flat_map(|r| r.y.iter().copied()).collect();
@@ -44,7 +43,7 @@ impl Known {
         }
     }
 
-    /// The same for cards, about `model`; `y` and `u` are the sizes of the signals.
+    /// Computes them for cards and `model`; `y` and `u` are the sizes of the signals.
     pub(crate) fn facts(&self, model: &Model, y: f64, u: f64) -> Facts<'_> {
         let period = model.sample_period_s;
         let record = self.longest as f64 * period;
@@ -63,7 +62,7 @@ impl Known {
     }
 }
 
-/// Parameter vectors from which a fit of `base` with `spec` sets out.
+/// Parameter vectors at which a fit of `base` with `spec` starts.
 pub(crate) fn starts(base: &Model, spec: &Spec, records: &[&Record]) -> Vec<Vec<f64>> {
     let (y, u) = (
         size_of(records, |record| &record.y),
@@ -80,12 +79,12 @@ pub(crate) fn starts(base: &Model, spec: &Spec, records: &[&Record]) -> Vec<Vec<
             .map(|value| StartValue::Number(*value).value(parameter, &facts))
             .collect()
     }));
-    // Thinned evenly, so that no parameter keeps only its first value.
+    // Reduced evenly, so that no parameter keeps only its first value.
     let stride = all.len().div_ceil(RULES.most_starts).max(1);
     all.into_iter().step_by(stride).collect()
 }
 
-/// The starts that a card writes out; `None` where it leaves them to a grid.
+/// The starting values that a card lists; `None` if the card specifies a grid.
 pub(crate) fn rows(spec: &Spec, facts: &Facts<'_>) -> Option<Vec<Vec<f64>>> {
     let Starts::Rows(rows) = spec.starts else {
         return None;

@@ -210,8 +210,8 @@ impl FitSignals {
         Weights::Intervals(self.u.iter().enumerate().map(arrived).collect())
     }
 
-    /// For each edge of u the interval `(first, end)` of samples in which it may arrive, ascending: it has
-    /// not arrived before `first` and has arrived at `end`. Outside these intervals the arrived command is
+    /// For each edge of u the interval `(first, end)` of samples in which it may arrive, ascending: it has not
+    /// arrived before `first`, and it has arrived at `end`. Outside these intervals the arrived command is
     /// constant.
     fn undecided(&self, record: usize, factor: f64, tick: i64, rows: usize) -> Vec<(usize, usize)> {
         let stretches = self.base_range.get(record).map(Vec::as_slice);
@@ -276,10 +276,10 @@ pub(crate) fn factor(tick: i64) -> f64 {
     tick as f64 * FACTOR_STEP
 }
 
-/// The law for one input, as the model's core runs it.
+/// The law for one input, computed as in `model-core`.
 pub(crate) type CoreLaw = ScaledDelay<StateDependentDelay<f64>, [f64; 1], true>;
 
-/// The law as the model's core runs it.
+/// The law, computed as in `model-core`.
 pub(crate) fn core_law(law: &ExponentialDelay, factor: f64) -> CoreLaw {
     ScaledDelay {
         law: StateDependentDelay {

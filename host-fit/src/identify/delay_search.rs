@@ -1,4 +1,4 @@
-//! The search of the delays: which steps, in which order, how many restarts.
+//! The strategy of the delay search: steps, their order, number of restarts.
 
 use std::sync::atomic::AtomicBool;
 
@@ -83,7 +83,7 @@ pub(crate) fn search(
         interrupt,
     );
     if free.best.is_none() {
-        // Interrupted in the first stage: its best point is the result.
+        // After an interrupt in the first stage its best point is the result.
         free.best = report.best.map(|best| {
             let delays = free_run.regression.layout.delays(&best.point);
             let value = match free_run.epsilon(&delays, f64::INFINITY) {

@@ -52,7 +52,7 @@ pub enum IdentifyError {
         /// Coefficients.
         coefficients: usize,
     },
-    /// A signal of unequal length or with a value that is no number.
+    /// A signal of another length, or with a value that is not a number.
     #[error(
         "record `{record}`: signal `{signal}` has the wrong length or a value that is not finite. Clean the CSV file."
     )]

@@ -1,8 +1,8 @@
-//! Exchange steps for the one-step objective: the best single lag, pair of lags or input delay in place of
-//! present ones, evaluated for all lags at once.
+//! Exchange steps for the one-step objective: the best single lag, pair of lags or input delay to replace present
+//! ones, evaluated for all lags at once.
 //!
-//! With the other regressors factorised, the gain of a new regressor takes one forward substitution and one
-//! division, done for a whole row of the table (all lags) at a time.
+//! With the other regressors factorised, the gain of a new regressor needs one forward substitution and one
+//! division. This is done for a whole row of the table (all lags) at a time.
 
 use super::arrival::Weights;
 use super::lagged_products::{ONE, TARGET, Table};
@@ -10,7 +10,7 @@ use super::layout::{Column, Delays};
 use super::regression::Regression;
 use crate::linalg::Cholesky;
 
-/// Gains below this share of the residual are rounding.
+/// Gains below this share of the residual are rounding errors.
 const NEGLIGIBLE: f64 = 1e-7;
 
 /// A new regressor must keep this share of its length after projection.
@@ -23,14 +23,14 @@ pub(crate) enum List {
     Product,
 }
 
-/// One place in the lists of lags.
+/// One position in the lists of lags.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Slot {
     pub(crate) list: List,
     pub(crate) index: usize,
 }
 
-/// The gain of every lag of a list beside a set of regressors.
+/// The gain of every lag of a list, given a set of regressors.
 struct Projected {
     /// Per input of the block, per kept regressor: projections, one per lag.
     rows: Vec<Vec<Vec<f64>>>,
@@ -67,8 +67,8 @@ impl<'a> Exchange<'a> {
         self.regression.normal(delays).squared_residual()
     }
 
-    /// Replaces one lag after the other by the best one until none helps.
-    /// Returns the squared residual norm.
+    /// Replaces one lag after the other by the best one until none improves the fit. Returns the squared residual
+    /// norm.
     pub(crate) fn descend(&mut self, delays: &mut Delays) -> f64 {
         self.complete(delays);
         let mut best = self.residual(delays);
@@ -99,8 +99,8 @@ impl<'a> Exchange<'a> {
         best
     }
 
-    /// Replaces pairs of lags by the best pair until none helps or the number of
-    /// sweeps is used up; single exchanges are included.
+    /// Replaces pairs of lags by the best pair until none improves the fit or the number of sweeps is used up;
+    /// single exchanges are included.
     pub(crate) fn descend_in_pairs(
         &mut self,
         delays: &mut Delays,
@@ -240,7 +240,7 @@ impl<'a> Exchange<'a> {
             let (left, target) = (a.left[c], a.target[0][c]);
             let alone = gain(target, left);
             for d in if same { c + 1..lags } else { 0..lags } {
-                // The additional gain of the second lag beside the first.
+                // The additional gain of the second lag, given the first.
                 let share = cross[d] / left;
                 let left_d = b.left[d] - share * cross[d];
                 let target_d = b.target[0][d] - share * target;
@@ -471,9 +471,8 @@ fn sort(delays: &mut Delays) {
     delays.product.sort_unstable();
 }
 
-/// Best delay of one input with the lags as they are: a scan in steps of half a
-/// sample, then ever finer around the best. Returns the tick and the squared
-/// residual norm, and adds to `screened`.
+/// Best delay of one input with unchanged lags: a scan in steps of half a sample, then finer around the best.
+/// Returns the tick and the squared residual norm, and adds to `screened`.
 pub(crate) fn best_input(
     regression: &Regression,
     delays: &Delays,
@@ -482,7 +481,7 @@ pub(crate) fn best_input(
     screened: &mut usize,
 ) -> Option<(i64, f64)> {
     let per_sample = regression.signals.ticks_per_sample();
-    // Without on/off edges each point of a scan sums over all samples: whole samples first.
+    // Without on/off edges each point of a scan sums over all samples, so whole samples are scanned first.
     let graded = matches!(regression.signals.arrived(0), Weights::Samples(_));
     let mut stride = (per_sample * if graded { 8.0 } else { 0.5 }).max(1.0) as i64;
     let (mut low, mut high) = bounds;

@@ -15,7 +15,7 @@ pub(crate) struct FreeRun {
 }
 
 impl FreeRun {
-    /// ε of a candidate; may stop with a value ≥ `give_up_at`.
+    /// ε of a candidate; the run may stop with a value ≥ `give_up_at`.
     pub(crate) fn epsilon(&self, delays: &Delays, give_up_at: f64) -> Evaluation {
         let (solution, _) = self.regression.normal(delays).solve();
         let coefficients = Coefficients::new(&solution, delays);

@@ -74,7 +74,7 @@ fn descend(
                 .map(|lag| with_lag(evaluator.problem(), &delays, slot, *lag))
                 .collect();
             let found = best_of(evaluator, &trials, &mut best)?;
-            // Continue from the best lag of the slot, new or not.
+            // Continue from the best lag of the slot, whether new or not.
             let mut lag = match found {
                 Some(at) => minima[at],
                 None => lag_in(&delays, slot),
@@ -161,7 +161,7 @@ fn predicted_minima(
         })
         .collect();
     let at = |i: usize| predicted.get(i).copied().unwrap_or(f64::INFINITY);
-    // Even and odd lags can form two curves: compare with the second neighbours too.
+    // Even and odd lags can form two curves, so the second neighbours are compared too.
     let mut minima: Vec<(f64, u16)> = (0..predicted.len())
         .filter(|&i| {
             at(i) < below * below
@@ -179,7 +179,7 @@ fn predicted_minima(
         .collect()
 }
 
-/// Walks the input delays as long as that helps, with everything else as it is.
+/// Moves the input delays step by step while that lowers ε, with everything else unchanged.
 fn walk_inputs(
     evaluator: &mut Evaluator<'_, FreeRun>,
     mut best: Success,
@@ -204,8 +204,8 @@ fn walk_inputs(
     Ok(best)
 }
 
-/// Search step: a variable neighbourhood search with informed kicks. A few lags of a local optimum move to
-/// other minima of the prediction, which mostly avoids diverging models, and a descent follows. Ends after
+/// Search step: a variable neighbourhood search with informed perturbations (kicks). A few lags of a local optimum
+/// move to other minima of the prediction, which mostly avoids diverging models, and a descent follows. Ends after
 /// `patience` kicks without improvement or `most` kicks in all.
 pub(crate) struct FreeKickStep {
     patience: usize,
@@ -229,7 +229,7 @@ impl FreeKickStep {
         }
     }
 
-    /// A point some lags away from the incumbent.
+    /// A point that differs from the incumbent in some lags.
     fn kick(
         &mut self,
         evaluator: &mut Evaluator<'_, FreeRun>,

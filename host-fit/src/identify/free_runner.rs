@@ -1,10 +1,10 @@
 //! Fast free runs of candidates: the inner loop of the free-run search.
 //!
-//! The recursion of `model-core`, in blocks of samples. Lags longer than the block read outputs known before
-//! it, so their terms are added to all its samples at once; short lags are added sample by sample. If the
-//! delay decides whether an edge has arrived, a block is run with the delay of its first sample, and again
-//! sample by sample if the delay changes within it. The order of additions differs from `model-core`: the
-//! last bits differ, which does not affect a search.
+//! The recursion of `model-core`, in blocks of samples. Lags longer than the block read outputs known before it, so
+//! their terms are added to all its samples at once; short lags are added sample by sample. If the delay decides
+//! whether an edge has arrived, a block is run with the delay of its first sample, and again sample by sample if
+//! the delay changes within it. The order of additions differs from `model-core`, so the last bits differ; this
+//! does not affect a search.
 
 use model_core::delay::DelayLaw as _;
 
@@ -68,7 +68,7 @@ impl Terms {
         }
     }
 
-    /// Adds the long lags' terms to `sums`, the first of which follows place `at`.
+    /// Adds the terms of the long lags to `sums`, whose first element follows position `at`.
     #[inline(always)]
     fn add_far(&self, past: &[f64], at: usize, sums: &mut [f64; BLOCK]) {
         for &(behind, weight) in &self.far {
@@ -80,7 +80,7 @@ impl Terms {
         }
     }
 
-    /// The short lags' terms of the value that follows place `at`, without the newest.
+    /// The short lags' terms of the value that follows position `at`, without the newest.
     #[inline(always)]
     fn near(&self, outputs: &[f64], at: usize) -> f64 {
         self.near.iter().fold(0.0, |sum, (behind, weight)| {

@@ -1,11 +1,10 @@
 //! Tables of lagged products: every sum that a regression on lagged outputs needs.
 //!
 //! The regressors of eqs. (3) and (4) are outputs y_{k−m}, alone or times the arriving command d_k. All inner
-//! products between them are P_w(i, j) = Σ_k w_k y_{k+1−i} y_{k+1−j} with w = 1 or products of d. If w
-//! consists of intervals, an entry follows from its neighbour on the diagonal by the samples that enter and
-//! leave at the ends of the intervals: a table costs O(lags² × edges + lags × samples). Other weights take a
-//! matrix product over all samples. A regression is then a matter of look-ups, whatever the length of the
-//! records.
+//! products between them are P_w(i, j) = Σ_k w_k y_{k+1−i} y_{k+1−j} with w = 1 or products of d. If w consists of
+//! intervals, an entry follows from its neighbour on the diagonal by the samples that enter and leave at the ends
+//! of the intervals. A table then costs O(lags² × edges + lags × samples). Other weights need a matrix product over
+//! all samples. A regression needs only look-ups, whatever the length of the records.
 
 use super::arrival::Weights;
 use crate::linalg::{self, dot, dots};
@@ -42,7 +41,7 @@ impl Table {
     }
 }
 
-/// Rows handled at a time where a table needs a matrix product.
+/// Rows processed at a time if a table needs a matrix product.
 const BLOCK_ROWS: usize = 512;
 
 /// The outputs of all records, from which tables are made.
@@ -79,7 +78,7 @@ impl LaggedOutputs {
     pub(crate) fn value(&self, record: usize, k: usize, element: Element) -> f64 {
         match element {
             ONE => 1.0,
-            // y_{k+1−i} with i = element − 1 lies `padding` places further on.
+            // y_{k+1−i} with i = element − 1 is stored `padding` positions later.
             _ => self.padded[record][self.padding() + k + 2 - element],
         }
     }
@@ -104,11 +103,11 @@ impl LaggedOutputs {
         }
     }
 
-    /// Shifting both elements of an entry by a sample shifts the intervals of its sum: along a diagonal the
-    /// entries differ only by the samples that enter and leave at the ends. Row 0 is summed directly; the
-    /// changes are one matrix product with a row for each end.
+    /// Shifting both elements of an entry by a sample shifts the intervals of its sum. Along a diagonal the entries
+    /// therefore differ only by the samples that enter and leave at the ends. Row 0 is summed directly; the changes
+    /// are one matrix product with a row for each end.
     fn table_from_intervals(&self, intervals: &[Vec<(usize, usize)>]) -> Table {
-        // Of the elements 1 + i: row i stands for y_{k+1−i}.
+        // For the elements 1 + i: row i belongs to y_{k+1−i}.
         let shifts = self.size - 1;
         let (mut first_row, mut first_sum) = (vec![0.0; shifts], 0.0);
         // For each end: the outputs y_{n−i} from i = 0 on, newest last, and its sign.
@@ -153,7 +152,7 @@ impl LaggedOutputs {
             for i in 0..shifts - p {
                 table.set(1 + i, 1 + i + p, entry);
                 if i + p + 1 < shifts {
-                    // The lower half is the one that is filled.
+                    // Only the lower half is filled.
                     entry += change[i * (shifts - 1) + i + p];
                 }
             }

@@ -25,7 +25,7 @@ pub(crate) struct Column {
     pub(crate) element: Element,
 }
 
-/// The variables of a search and what they mean.
+/// The variables of a search and their meaning.
 #[derive(Debug, Clone)]
 pub(crate) struct Layout {
     pub(crate) variables: Vec<Variable>,

@@ -14,7 +14,7 @@ use super::layout::{Column, Delays, Layout};
 use super::regression::Regression;
 use crate::linalg;
 
-/// Decimation of the samples in the products. Odd, so that patterns of period two are sampled.
+/// Decimation of the samples in the products. It is odd, so that patterns of period two are sampled.
 const STRIDE: usize = 41;
 
 /// Sensitivities that are computed in parallel.
@@ -113,7 +113,7 @@ impl Filter<'_> {
             let drive = S::as_mut_simd_f32s(drive).0;
             let past = S::as_simd_f32s(past).0;
             let steps_back = |m: usize| &past[past.len() - (1 + m) * REGISTERS..][..REGISTERS];
-            // Two sums per register, so that additions do not wait for each other.
+            // Two sums per register, so that additions need not wait for each other.
             let mut sums = [simd.splat_f32s(0.0); REGISTERS];
             let mut others = sums;
             let pairs = terms.chunks_exact(2);
@@ -289,7 +289,7 @@ impl Linearised {
         }
     }
 
-    /// Makes predictions for neighbours of a candidate cheap.
+    /// Prepares fast predictions for neighbours of a candidate.
     pub(crate) fn include(&mut self, layout: &Layout, delays: &Delays) {
         let columns = layout.columns(delays);
         self.multiply(columns.iter().map(|c| self.index(c)).collect());

@@ -1,9 +1,8 @@
 //! Identification: recordings to delays and coefficients.
 //!
-//! MADS proposes delays, least squares gives the coefficients, and either the
-//! one-step residual or the free run ε judges them. The sums behind the least
-//! squares are tabulated once ([`lagged_products`](self)), so an evaluation
-//! costs look-ups and a small solve.
+//! MADS proposes delays, and least squares gives the coefficients. The objective is the one-step residual or the
+//! free-run error ε. The sums for the least squares are tabulated once ([`lagged_products`](self)), so an
+//! evaluation needs only look-ups and a small solve.
 
 mod arrival;
 mod coefficients;

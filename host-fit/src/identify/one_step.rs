@@ -86,7 +86,7 @@ pub(crate) fn settle(
     }
 }
 
-/// Search step: exchanges single lags and input delays until none helps.
+/// Search step: exchanges single lags and input delays until none improves the fit.
 pub(crate) fn exchange_singles(
     evaluator: &mut Evaluator<'_, OneStep>,
     around: &Around<'_>,
@@ -100,7 +100,7 @@ pub(crate) fn exchange_singles(
     Ok((point, success))
 }
 
-/// Search step: exchanges pairs of lags, once single exchanges no longer help.
+/// Search step: exchanges pairs of lags when single exchanges no longer improve the fit.
 pub(crate) fn exchange_pairs(
     evaluator: &mut Evaluator<'_, OneStep>,
     around: &Around<'_>,
@@ -118,8 +118,8 @@ pub(crate) fn exchange_pairs(
     Ok((point, success))
 }
 
-/// Search step: from a local optimum, replaces a few lags at random, descends again, and ends after
-/// `patience` kicks without improvement.
+/// Search step: replaces a few lags of a local optimum at random and descends again. Ends after `patience` such
+/// kicks without improvement.
 pub(crate) struct KickStep {
     patience: usize,
     fruitless: usize,

@@ -11,7 +11,7 @@ use crate::linalg::{self, Cholesky};
 
 /// Number of cached tables; the least recently used is dropped. One of 500 lags takes 2 MB.
 const TABLES_KEPT: usize = 48;
-/// Tables in memory beside the cached ones: the unweighted one, and two matrices needed to build one.
+/// Tables in memory in addition to the cached ones: the unweighted one, and two matrices needed to build one.
 const TABLES_BESIDE: u64 = 3;
 
 /// Bytes of one table.
@@ -145,7 +145,7 @@ impl Regression {
         }
     }
 
-    /// Whether the arriving commands are 0 and 1 only.
+    /// Whether the arriving commands are only 0 and 1.
     pub(crate) fn is_binary(&self) -> bool {
         self.binary
     }
@@ -247,8 +247,8 @@ impl Regression {
         }
     }
 
-    /// Normal equations of a candidate: look-ups, and where no table fits
-    /// exactly, corrections or direct sums over the samples.
+    /// Normal equations of a candidate, from look-ups. If no table is exact for it, corrections or direct sums over
+    /// the samples are used.
     pub(crate) fn normal(&self, delays: &Delays) -> Normal {
         let columns = self.layout.columns(delays);
         let n = columns.len();
@@ -376,8 +376,8 @@ impl Regression {
         }
     }
 
-    /// Squared residual norms with one input's delay at each of `ticks`, which
-    /// should be neighbours: each is corrected from the one before.
+    /// Squared residual norms with one input's delay at each of `ticks`. These should be neighbours, because each
+    /// norm is computed by correcting the previous one.
     pub(crate) fn scan_input(&self, delays: &Delays, input: usize, ticks: &[i64]) -> Vec<f64> {
         let mut current: Option<(Normal, Vec<Weights>)> = None;
         let mut residuals = Vec::with_capacity(ticks.len());
@@ -419,8 +419,8 @@ impl Regression {
         residuals
     }
 
-    /// Coefficients by the pseudo-inverse and the residual norm by direct
-    /// summation, both from the samples themselves: the figures to report.
+    /// Coefficients by the pseudo-inverse and the residual norm by direct summation, both from the samples
+    /// themselves. These values are reported.
     ///
     /// # Errors
     /// [`linalg::NotConverged`] when the decomposition fails.

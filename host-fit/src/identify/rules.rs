@@ -6,8 +6,7 @@ rules! {
     /// Records for identification, and quality criteria of the model.
     pub struct Rules in "identify";
 
-    /// The simulation of a candidate stops when its free run exceeds this, long before it would count as
-    /// diverged.
+    /// The simulation of a candidate stops when its free run exceeds this, well below the limit of divergence.
     hopeless: f64 = 10.0, "times the largest |y|", "judgement: such candidates are never the best";
     /// A model whose validation FIT is this much below its estimation FIT is reported as over-fitted.
     overfitted_points: f64 = 12.0, "points of FIT", "judgement: on the flow simulation sixteen lags lose 28 to 34, two lags 7 to 11";
@@ -16,11 +15,11 @@ rules! {
     longest_lag: u16 = 500, "samples", "the paper";
     /// Records shorter than this multiple of the longest lag get shorter lags.
     longest_lag_fits: usize = 4, "times", "judgement";
-    /// Patience of a search, the unit of the numbers of kicks.
+    /// Patience of a search: the unit in which numbers of kicks (random perturbations) are given.
     patience: usize = 3, "", "tuned on sets 1 to 3 of docs/search.md";
-    /// Kicks without improvement per unit of patience that end a one-step search.
+    /// A one-step search ends after this many kicks without improvement, per unit of patience.
     kicks: usize = 6, "kicks", "tuned on sets 1 to 3 of docs/search.md";
-    /// Kicks without improvement per unit of patience that end a free-run search.
+    /// A free-run search ends after this many kicks without improvement, per unit of patience.
     free_kicks: usize = 8, "kicks", "tuned on sets 1 to 3 of docs/search.md";
     /// Most kicks of a free-run search per unit of patience.
     most_free_kicks: usize = 12, "kicks", "tuned on sets 1 to 3 of docs/search.md";
@@ -33,17 +32,17 @@ rules! {
     /// Lags that a kick of the free-run search replaces.
     kicked_lags: usize = 2, "lags", "tuned on sets 1 to 3 of docs/search.md";
     /// Least distance of a lag that replaces another in such a kick.
-    kick_distance: u16 = 4, "samples", "a descent reaches as far";
+    kick_distance: u16 = 4, "samples", "a descent reaches this far";
     /// Number of predicted minima per slot that are simulated.
     minima: usize = 7, "lags", "judgement";
     /// A predicted minimum is simulated if it is below this.
     promising: f64 = 1.01, "times the best error", "judgement";
     /// Steps of the line search over input delays.
     input_moves: [f64; 9] = [0.02, 0.1, 0.3, 0.5, 1.0, 2.0, 3.0, 6.0, 12.0], "samples", "a grid in steps of 2 to 5";
-    /// Input delays are searched when a descent comes this close to the best.
+    /// Input delays are searched when a descent comes within this factor of the best.
     close: f64 = 1.01, "times the best error", "judgement";
     /// A descent ends with a sweep that gains less than this.
     small_gain: f64 = 1e-3, "share of the error", "judgement";
-    /// A descent is given up if its error after sweep n exceeds the best by more than this over n.
+    /// A descent is stopped if its error after sweep n exceeds the best by more than this over n.
     falling_behind: f64 = 0.05, "share of the best error", "judgement";
 }

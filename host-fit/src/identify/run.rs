@@ -25,8 +25,8 @@ use model_core::average::WINDOW;
 /// Result of an identification.
 #[derive(Debug, Clone)]
 pub struct Identified {
-    /// The model; lags sorted, repeated lags dropped. Its training record has
-    /// objective and seed; the caller adds what else it knows.
+    /// The model, with sorted lags and without repeated ones. Its training record has objective and seed; the
+    /// caller adds the rest.
     pub model: Model,
     /// What was minimised.
     pub objective: Objective,
@@ -37,7 +37,7 @@ pub struct Identified {
     pub one_step_norm: f64,
     /// Evaluations of the objective.
     pub evaluations: usize,
-    /// Candidates that search steps judged in closed form.
+    /// Candidates that search steps evaluated in closed form.
     pub screened: usize,
     /// Time taken.
     pub wall_time: Duration,
@@ -67,7 +67,7 @@ struct Shown<'a> {
     series: &'a [Series<'a>],
     records: &'a [&'a Record],
     options: &'a IdentifyOptions,
-    /// A regression of its own, since the search owns the other; built at first use.
+    /// A separate regression, since the search owns the other; built at first use.
     regression: OnceLock<Regression>,
 }
 
@@ -92,7 +92,7 @@ impl Progress for Shown<'_> {
 /// judge the refinement.
 ///
 /// # Errors
-/// [`IdentifyError`] names what is wrong with the data or the structure and the remedy.
+/// [`IdentifyError`] names the problem of the data or the structure, and the remedy.
 pub fn identify(
     data: &[Record],
     options: &IdentifyOptions,

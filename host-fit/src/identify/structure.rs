@@ -13,7 +13,7 @@ pub(crate) const FACTOR_STEP: f64 = 1e-4;
 pub struct ExponentialDelay {
     /// p0, samples: delay of the attached flow.
     pub floor: f64,
-    /// p1, samples: how much longer the delay of the separated flow is.
+    /// p1, samples: additional delay of the separated flow.
     pub rise: f64,
     /// p2, 1/y: how quickly the delay shortens as the flow attaches.
     pub rate: f64,
@@ -27,7 +27,7 @@ impl ExponentialDelay {
         rate: 20.18,
     };
 
-    /// Where a search for the law sets out.
+    /// Initial values of a search for the law.
     pub const USUAL: Self = Self {
         floor: 40.0,
         rise: 10.0,

@@ -1,7 +1,7 @@
 //! Cholesky factors of small symmetric matrices, the innermost loop of the search.
 
-/// A pivot below this share of its diagonal entry marks a dependent column,
-/// which is left out: the residual is then that of the pseudo-inverse.
+/// A pivot below this share of its diagonal entry marks a dependent column. The column is left out, and the
+/// residual is that of the pseudo-inverse.
 const PIVOT_TOLERANCE: f64 = 1e-12;
 
 /// Lower factor of a positive semi-definite matrix, row by row.
@@ -48,7 +48,7 @@ impl Cholesky {
         self.inverse_diagonal[i]
     }
 
-    /// L⁻¹ r; its squared length is what the columns explain of the target.
+    /// L⁻¹ r; its squared length is the part of the target that the columns explain.
     pub(crate) fn forward(&self, rhs: &[f64]) -> Vec<f64> {
         let mut w = rhs.to_vec();
         for i in 0..self.n {
@@ -73,8 +73,8 @@ impl Cholesky {
     }
 }
 
-/// Solves A·x = b for a symmetric positive definite A (row-major); `None` if it
-/// is not. Unknowns may be of very different size.
+/// Solves A·x = b for a symmetric positive definite A (row-major); `None` if it is not. The unknowns may differ in
+/// size by many orders.
 pub(crate) fn solve_symmetric(a: &[f64], b: &[f64]) -> Option<Vec<f64>> {
     let factor = Cholesky::new(a, b.len());
     let complete = factor.inverse_diagonal.iter().all(|inverse| *inverse > 0.0);

@@ -1,5 +1,5 @@
-//! Dense linear algebra: small systems by an own [`Cholesky`] factor, everything else by faer, which no other module
-//! knows.
+//! Dense linear algebra: small systems by our own [`Cholesky`] factor, everything else by faer, which only this
+//! module uses.
 
 mod cholesky;
 
@@ -12,9 +12,9 @@ use faer::{Accum, Mat, MatMut, MatRef, Par, Side};
 /// Singular values below this share of the largest count as zero.
 const RANK_TOLERANCE: f64 = 1e-12;
 
-/// Directions with less than this share of the best known one's information are unknown.
+/// A direction with less than this share of the information of the best one counts as not identified.
 const UNKNOWN: f64 = 1e-11;
-/// A coordinate takes part in directions that hold more than this share of it.
+/// A coordinate belongs to a direction if it has more than this share of it.
 const TAKES_PART: f64 = 1e-6;
 
 /// A decomposition that did not converge.
@@ -26,8 +26,8 @@ pub struct NotConverged;
 
 /// Minimum-norm least-squares solution x = A⁺y, eq. (8).
 ///
-/// `columns` are the columns of A, each as long as `rhs`. Dependent columns
-/// share their coefficient, as the Moore–Penrose pseudo-inverse has it.
+/// `columns` are the columns of A, each as long as `rhs`. Dependent columns share their coefficient, as in the
+/// Moore–Penrose pseudo-inverse.
 ///
 /// # Errors
 /// [`NotConverged`] when the singular value decomposition fails.
@@ -58,8 +58,8 @@ pub(crate) fn least_squares(columns: &[Vec<f64>], rhs: &[f64]) -> Result<Vec<f64
     Ok((0..columns.len()).map(|i| solution[(i, 0)]).collect())
 }
 
-/// Σ a_i·b_i in four partial sums, so that the processor can work on them side by
-/// side; the order is fixed and the result repeatable.
+/// Σ a_i·b_i in four partial sums, which the processor can compute in parallel; the order is fixed and the result
+/// repeatable.
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     pulp::Arch::new().dispatch(
         #[inline(always)]
@@ -77,7 +77,7 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     )
 }
 
-/// [`dot`] of `a` with each of `others`, four at a time: the processor then waits for no sum. The values are those of
+/// [`dot`] of `a` with each of `others`, four at a time, so that no sum waits for another. The values are those of
 /// [`dot`].
 pub(crate) fn dots<'a>(a: &[f64], others: impl IntoIterator<Item = &'a [f64]>) -> Vec<f64> {
     let mut products = Vec::new();
@@ -139,9 +139,8 @@ fn four_dots(a: &[f64], others: [&[f64]; 4]) -> [f64; 4] {
     )
 }
 
-/// The inverse of an information matrix (symmetric, row-major, `n` × `n`) in the
-/// directions that it knows, and which coordinates take part in the others.
-/// `None` if the decomposition fails.
+/// The inverse of an information matrix (symmetric, row-major, `n` × `n`) in its identified directions, and the
+/// coordinates that belong to the others. `None` if the decomposition fails.
 pub(crate) fn inverse_where_known(a: &[f64], n: usize) -> Option<(Vec<f64>, Vec<bool>)> {
     let size = |i: usize| a.get(i * n + i).filter(|d| **d > 0.0).map(|d| d.sqrt());
     let sizes: Vec<f64> = (0..n).map(|i| size(i).unwrap_or(1.0)).collect();
@@ -172,8 +171,8 @@ pub(crate) fn symmetric_eigenvalues(a: &[f64], n: usize) -> Option<Vec<f64>> {
     matrix.self_adjoint_eigenvalues(Side::Lower).ok()
 }
 
-/// Adds AᵀB to `out`; A and B are `rows` × `size`, column by column, `out` is
-/// `size` × `size`, column by column. Slices of other lengths are left alone.
+/// Adds AᵀB to `out`; A and B are `rows` × `size`, column by column, `out` is `size` × `size`, column by column.
+/// Slices of other lengths are ignored.
 pub(crate) fn add_cross_products(out: &mut [f64], a: &[f64], b: &[f64], rows: usize, size: usize) {
     if out.len() != size * size || a.len() != rows * size || b.len() != rows * size {
         return;
@@ -188,8 +187,8 @@ pub(crate) fn add_cross_products(out: &mut [f64], a: &[f64], b: &[f64], rows: us
     );
 }
 
-/// AᵀSA for a matrix A, column by column, with as many rows as there are `signs`, the
-/// diagonal of S. The result is column by column; only its lower half is filled.
+/// AᵀSA for a matrix A, column by column, with as many rows as there are `signs`, the diagonal of S. The result is
+/// column by column; only its lower half is filled.
 pub(crate) fn signed_products(a: &[f64], signs: &[f64]) -> Vec<f64> {
     let rows = signs.len();
     if rows == 0 {
@@ -217,8 +216,7 @@ pub(crate) fn signed_products(a: &[f64], signs: &[f64]) -> Vec<f64> {
     out
 }
 
-/// AᵀB for A and B of `rows` rows, column by column; the result too. Whole
-/// columns only: what is left over is ignored.
+/// AᵀB for A and B of `rows` rows, column by column; the result too. Incomplete columns are ignored.
 pub(crate) fn cross_products(a: &[f64], b: &[f64], rows: usize) -> Vec<f64> {
     if rows == 0 {
         return Vec::new();
@@ -236,11 +234,12 @@ pub(crate) fn cross_products(a: &[f64], b: &[f64], rows: usize) -> Vec<f64> {
     out
 }
 
-/// Longest recursion whose poles are found as eigenvalues: that takes n³ operations and n² numbers, 1 s and 5 MB here.
+/// Longest recursion whose poles are computed as eigenvalues. That takes n³ operations and n² numbers: here 1 s and
+/// 5 MB.
 const DENSE: usize = 800;
 
-/// The largest magnitude of the poles of x_{k+1} = Σ_i w_i x_{k+1−i}, with `weights[i − 1]` = w_i; 0 without weights.
-/// Of a long recursion it is the rate at which its free motion grows.
+/// The largest magnitude of the poles of x_{k+1} = Σ_i w_i x_{k+1−i}, with `weights[i − 1]` = w_i; 0 without
+/// weights. For a long recursion it is the growth rate of its free motion.
 ///
 /// # Errors
 /// [`NotConverged`] when the eigenvalue iteration fails.
@@ -251,8 +250,8 @@ pub(crate) fn largest_pole(weights: &[f64]) -> Result<f64, NotConverged> {
     Ok(pole_magnitudes(weights)?.first().copied().unwrap_or(0.0))
 }
 
-/// What the free motion of a recursion grows by in a sample, in the long run. The largest value of one span of
-/// 20 recursions' lengths is compared with that of the span before, so that beats do not count.
+/// Growth factor of the free motion of a recursion per sample, in the long run. The largest value within 20 lengths
+/// of the recursion is compared with that of the interval before, so that beats do not count.
 fn growth(weights: &[f64]) -> f64 {
     let own: Vec<(usize, f64)> = (weights.iter().copied().enumerate())
         .filter(|(_, w)| *w != 0.0)
@@ -261,7 +260,8 @@ fn growth(weights: &[f64]) -> f64 {
     let span = 20 * n;
     let mut past = vec![0.0; n];
     past[n - 1] = 1.0;
-    // The newest is at `at − 1`; logarithms of what was divided out, and of the largest value of each span.
+    // The newest value is at `at − 1`; the logarithms of the normalisation and of the largest value of each
+    // interval.
     let (mut scaled, mut largest, mut before) = (0.0_f64, 0.0_f64, 0.0_f64);
     for k in 0..3 * span {
         let at = k % n;
@@ -300,8 +300,8 @@ fn pole_magnitudes(weights: &[f64]) -> Result<Vec<f64>, NotConverged> {
     Ok(poles.iter().map(|(re, im)| re.hypot(*im)).collect())
 }
 
-/// The poles of x_{k+1} = Σ_i w_i x_{k+1−i} in the z plane, real and imaginary part, the largest modulus first; none for a
-/// recursion so long that the iteration takes more than a second.
+/// The poles of x_{k+1} = Σ_i w_i x_{k+1−i} in the z plane, real and imaginary part, the largest modulus first.
+/// `None` for a recursion so long that the iteration would take more than a second.
 ///
 /// # Errors
 /// [`NotConverged`] when the eigenvalue iteration fails.
@@ -338,8 +338,7 @@ mod tests {
         }
     }
 
-    /// Two coordinates that only their sum is known of, one that is known, of very
-    /// different size.
+    /// Two coordinates of which only the sum is identified, and one that is identified, of very different size.
     #[test]
     fn what_is_unknown_does_not_spoil_what_is_known() {
         let a = [4.0, 4e3, 0.0, 4e3, 4e6, 0.0, 0.0, 0.0, 1e-8];

@@ -17,7 +17,7 @@ use std::ops::RangeInclusive;
 /// A key and the problem with its value.
 pub(super) type Fault = (String, String);
 
-/// Longest memory of a model, samples: lags and delays are 16-bit numbers on the board, and nothing else is longer.
+/// Longest memory of a model, samples: lags and delays are 16-bit numbers on the board.
 pub(super) const LONGEST: u16 = u16::MAX;
 
 /// Longest time in a law, samples: the board adds two of them in 32 bits.
@@ -61,7 +61,7 @@ pub(super) fn window(samples: u32) -> Result<(), Fault> {
 /// range assumes signals of order 1; this range holds for any size.
 pub(super) fn parameter(key: &str, card: &Parameter, value: f64) -> Result<(), Fault> {
     if card.low >= 0.0 && value < 0.0 {
-        let problem = format!("{value:?} is negative, and it cannot be");
+        let problem = format!("{value:?} is negative, which is not allowed");
         return Err((key.to_owned(), problem));
     }
     match card.unit {
@@ -88,7 +88,8 @@ pub(super) fn delay(delay: &Delay, period_s: f64) -> Result<(), Fault> {
     }
     let key = law.spec.parameters.first().map_or("law", |p| p.name);
     let problem = format!(
-        "with the other parameters and the factors the longest delay is {longest:?} samples; {LONGEST} is the most"
+        "with the other parameters and the factors the longest delay is {longest:?} samples; at most {LONGEST} \
+             are allowed"
     );
     Err((format!("delay.{key}"), problem))
 }

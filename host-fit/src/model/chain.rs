@@ -1,4 +1,4 @@
-//! The effects of a model, composed at run time from the catalogue and the user's own.
+//! The effects of a model, composed at run time from the catalogue and the user's own effects.
 
 use super::{Added, Model};
 use crate::ring::Ring;
@@ -107,7 +107,7 @@ impl<T: Real> Chain<T> {
                 Place::Jet => jet.push(effect),
                 Place::Flow => flow.push(effect),
                 Place::Sensor => sensor.push(effect),
-                // A delay law is no effect of the chain.
+                // A delay law is not part of the chain.
                 Place::Delay => {}
             }
         }

@@ -1,4 +1,4 @@
-//! The input delays of a model: fixed, or after a law of the catalogue.
+//! The input delays of a model: fixed, or by a law of the catalogue.
 
 use model_core::Real;
 use model_core::delay::Transport;
@@ -13,7 +13,7 @@ pub enum Delay {
         /// h_l, samples.
         delays: Vec<u16>,
     },
-    /// h_l = f_l · h after a law h.
+    /// h_l = f_l · h with the delay h of a law.
     Law(TransportLaw),
 }
 
@@ -26,8 +26,7 @@ pub struct TransportLaw {
     pub parameters: Vec<f64>,
     /// f_l, one factor for each input.
     pub factors: Vec<f64>,
-    /// Whether the input is interpolated between samples instead of the delay
-    /// rounded as in eq. (4).
+    /// Whether the input is interpolated between samples, instead of rounding the delay as in eq. (4).
     pub interpolated: bool,
 }
 
@@ -74,7 +73,7 @@ impl TransportLaw {
 }
 
 impl Delay {
-    /// The delays h_l = f_l · h after the law `L`.
+    /// The delays h_l = f_l · h by the law `L`.
     #[must_use]
     pub fn of<L: Physics<f64> + Transport<f64>>(
         parameters: &[f64],
@@ -140,14 +139,14 @@ impl Delay {
         }
     }
 
-    /// This delay for as many inputs as `other` has: they follow the first one as theirs do.
+    /// This delay for as many inputs as `other` has, with the same ratios between the inputs.
     #[must_use]
     pub(crate) fn for_inputs_of(&self, other: &Self) -> Self {
         match (self, other) {
             (Self::Law(own), _) => {
                 let first = |factors: &[f64]| factors.first().copied().unwrap_or(1.0);
                 let (others, factor) = (other.factors(), first(&own.factors));
-                // Inputs behind one without a delay follow it as one.
+                // If the first input has no delay, the others have the same delay as it.
                 let ratio = |f: &f64| match first(&others) {
                     0.0 => 1.0,
                     first => f / first,

@@ -1,5 +1,5 @@
-//! `[delay]` of a model file: the law, its parameters by name, the factors of
-//! the inputs and whether the input is interpolated.
+//! `[delay]` of a model file: the law, its parameters by name, the factors of the inputs and whether the input is
+//! interpolated.
 
 use super::bounds::{self, Fault};
 use super::{Delay, TransportLaw};
@@ -7,7 +7,7 @@ use model_core::effect::Spec;
 use model_core::effects::LAWS;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-/// Name of whole-sample delays, which are no law.
+/// Name of fixed delays in whole samples, which are not a law.
 const FIXED: &str = "fixed";
 
 /// The keys and values, in the order in which they are written.
@@ -54,7 +54,7 @@ impl DelayTable {
         Self(pairs)
     }
 
-    /// The delays of a model with so many inputs, or the wrong key with its problem.
+    /// The delays of a model with this many inputs, or the wrong key with its problem.
     pub(super) fn into_delay(mut self, inputs: usize) -> Result<Delay, Fault> {
         let law = self.take("law");
         let Some(name) = law.as_ref().and_then(toml::Value::as_str) else {
@@ -69,13 +69,13 @@ impl DelayTable {
         }
         let Some(spec) = LAWS.iter().find(|spec| name_of(spec) == name) else {
             let known: Vec<&str> = LAWS.iter().map(name_of).collect();
-            let problem = format!("`{name}` is none of {FIXED}, {}", known.join(", "));
+            let problem = format!("`{name}` is not one of {FIXED}, {}", known.join(", "));
             return Err(fault("law", &problem));
         };
         let mut parameters = Vec::with_capacity(spec.parameters.len());
         for parameter in spec.parameters {
             let Some(value) = self.take(parameter.name).as_ref().and_then(number) else {
-                let problem = format!("({}) is missing or no finite number", parameter.unit);
+                let problem = format!("({}) is missing or not a finite number", parameter.unit);
                 return Err(fault(parameter.name, &problem));
             };
             bounds::parameter(&format!("delay.{}", parameter.name), parameter, value)?;
@@ -114,7 +114,10 @@ impl DelayTable {
         let array = value.as_array().map_or(&[][..], Vec::as_slice);
         let values: Option<Vec<T>> = array.iter().map(read).collect();
         let Some(values) = values else {
-            return Err(fault(key, "holds what is no number or out of range"));
+            return Err(fault(
+                key,
+                "contains a value that is not a number or out of range",
+            ));
         };
         if values.len() != inputs {
             let found = values.len();
@@ -183,7 +186,7 @@ mod tests {
     fn faults_name_the_key() {
         for (text, expected) in [
             ("delays = [1]", "delay.law"),
-            ("law = \"gone\"", "`gone` is none of fixed, constant"),
+            ("law = \"gone\"", "`gone` is not one of fixed, constant"),
             ("law = \"fixed\"", "delay.delays"),
             ("law = \"fixed\"\ndelays = [1, 2]", "has 2 entries"),
             ("law = \"fixed\"\ndelays = [-1]", "delay.delays"),

@@ -42,7 +42,7 @@ pub enum ModelError {
     Syntax {
         /// The file.
         place: String,
-        /// What is wrong, with line and key.
+        /// The problem, with line and key.
         problem: String,
     },
     /// Parts of it contradict each other.
@@ -55,7 +55,7 @@ pub enum ModelError {
         /// What is wrong.
         problem: String,
     },
-    /// A user's own effect in it was refused.
+    /// A user effect in it was refused.
     #[error(transparent)]
     Definition(#[from] DefinitionError),
     /// It could not be written.
@@ -175,7 +175,7 @@ impl Model {
                 ),
             }
         };
-        // The version is checked first: other versions may have other keys.
+        // The version is checked first, because other versions may have other keys.
         let table: toml::Table = toml::from_str(text).map_err(syntax)?;
         if let Some(found) = table
             .get("format_version")
@@ -211,7 +211,7 @@ impl Model {
         text.unwrap_or_default()
     }
 
-    /// Writes the model file, whole or not at all, and only if it can be read back.
+    /// Writes the model file completely or not at all, and only if it can be read back.
     ///
     /// # Errors
     /// [`ModelError::Output`], and those of [`load`](Self::load) for a model that contradicts itself.
@@ -430,7 +430,7 @@ impl EffectTable {
             return Err((key, problem));
         }
         if self.reference.is_some_and(|r| !r.is_finite()) {
-            return Err((key, "`reference` is no finite number".to_owned()));
+            return Err((key, "`reference` is not a finite number".to_owned()));
         }
         let known = |name: &String| spec.parameters.iter().any(|p| p.name == name);
         if let Some(name) = self.parameters.keys().find(|name| !known(name)) {
@@ -447,7 +447,7 @@ impl EffectTable {
             };
             let value = value.ok_or_else(|| {
                 let problem = format!(
-                    "parameter `{}` ({}) is missing or no finite number",
+                    "parameter `{}` ({}) is missing or not a finite number",
                     parameter.name, parameter.unit
                 );
                 (key.clone(), problem)

@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 pub enum Law {
     /// Holds the friction at a reference.
     Track(Track),
-    /// Plays the pulses that give the most friction for the air.
+    /// Plays the pulses with the most friction for a given price of air.
     Maximise(Maximise),
 }
 
@@ -30,17 +30,17 @@ struct HoldTable {
 pub struct Track {
     /// The friction to hold, y of the flow.
     pub reference: f64,
-    /// What on/off blowing can hold: the open interval.
+    /// Open interval of the levels that on/off blowing can hold.
     pub reachable: [f64; 2],
     /// Fastest change of the reference, y per sample; 0 for steps.
     pub slope: f64,
     /// Shortest on and off times.
     #[serde(with = "HoldTable")]
     pub hold: HoldTimes,
-    /// Samples per switch that the valve's budget allows, and switches saved up.
+    /// Samples per switch that the valve's budget allows, and largest number of saved switches.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub switches: Option<[u32; 2]>,
-    /// Allowed share of air in 1/1000, and samples of blowing saved up.
+    /// Allowed share of air in 1/1000, and largest number of saved samples of blowing.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub air: Option<[u32; 2]>,
     /// Prediction horizon of the bias estimate, samples.
@@ -87,7 +87,7 @@ pub struct Maximise {
     /// Shortest on and off times.
     #[serde(with = "HoldTable")]
     pub hold: HoldTimes,
-    /// Price of steady blowing for which it is optimal, y.
+    /// Price of steady blowing for which these pulses are optimal, y.
     pub air_price: f64,
     /// Trials in which attachment was lost, if the law was written with `--force`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]

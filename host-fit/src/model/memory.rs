@@ -1,6 +1,6 @@
 //! Memory and inputs of a model.
 //!
-//! Single source for the simulator, the design of laws and the generated code.
+//! Sizes of the memories: one source for the simulator, the design of laws and the generated code.
 
 use super::{Added, Delay, Model};
 use model_core::Real;
@@ -12,10 +12,9 @@ const BITS: usize = 32;
 /// The memory of a model.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Footprint {
-    /// Outputs kept, samples: more than the longest lag, no less than the
-    /// averaging window.
+    /// Stored outputs, samples: more than the longest lag, at least the averaging window.
     pub outputs: usize,
-    /// Jet strengths kept, samples: more than the longest input delay.
+    /// Stored jet strengths, samples: more than the longest input delay.
     pub jets: usize,
     /// Whether jets have strengths between on and off; otherwise one bit per sample is enough.
     pub graded: bool,

@@ -65,7 +65,7 @@ pub struct Model {
     pub delay: Delay,
     /// Effects in physical order, without delay laws.
     pub effects: Vec<Added>,
-    /// Reading at which the sensor counts as calibrated for added effects, y; none for 1. Not part of a model
+    /// Reading at which the sensor counts as calibrated for added effects, y; `None` for 1. Not part of a model
     /// file.
     pub calibrated_at: Option<f64>,
     /// The user's own effects that are available to the model, used or not.
@@ -79,8 +79,8 @@ pub struct Model {
 /// A model has a different effect of the same name.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 #[error(
-    "the model has an effect `{name}` that is defined otherwise. \
-     Give the new one another name, or start from a model without it."
+    "the model has an effect `{name}` with another definition. Give the new one another name, or start from a \
+     model without it."
 )]
 pub struct DefineError {
     /// The name.
@@ -91,7 +91,7 @@ pub struct DefineError {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Start {
-    /// Rest: everything was 0 before the record (the paper).
+    /// At rest: all signals were 0 before the record, as in the paper.
     #[default]
     Rest,
     /// Constant at the first values of the record, or at the known values before it. The first samples of a
@@ -117,7 +117,7 @@ pub struct Added {
 }
 
 impl Added {
-    /// Default of a missing reference; not 0, because effects divide by it.
+    /// Default of a missing reference. It is not 0, because effects divide by it.
     pub(crate) const NO_REFERENCE: f64 = 1.0;
 
     /// The reference of the effect's channel, in its unit, or the [calibration](Spec::calibrated) reading of
@@ -266,7 +266,7 @@ impl Model {
         Ok(())
     }
 
-    /// The model that knows `inputs` as effects that can be added, beside those it knows.
+    /// The model with `inputs` as further effects that can be added.
     #[must_use]
     pub(crate) fn with_inputs(&self, inputs: Vec<&'static Definition>) -> Self {
         let mut model = self.clone();
@@ -278,7 +278,7 @@ impl Model {
         model
     }
 
-    /// The effects among its candidates that are inputs measured beside the command.
+    /// The effects among its candidates that are measured inputs.
     pub(crate) fn measured_inputs(&self) -> impl Iterator<Item = &'static Spec> {
         let inputs = self
             .definitions
@@ -287,7 +287,7 @@ impl Model {
         inputs.map(|own| own.spec())
     }
 
-    /// Forgets definitions that neither the model has an effect of nor `given` knows.
+    /// Removes definitions that neither an effect of the model nor `given` uses.
     pub(crate) fn forget_unused(&mut self, given: &Self) {
         let used = |definition: &&'static Definition| {
             let name = definition.spec().name;
@@ -323,12 +323,12 @@ impl Model {
     #[must_use]
     pub fn longest_delay(&self) -> usize {
         let longest = self.delay.longest(self.sample_period_s);
-        // Longer ones in files are rejected; a search may exceed the limit.
+        // Longer ones in files are rejected; during a search they may exceed the limit.
         longest.clamp(0.0, bounds::LONGEST.into()).round() as usize
     }
 
-    /// Makes delays unrounded, so that a fit can vary them: after an edge, y changes by several times the
-    /// noise per sample.
+    /// Makes delays unrounded, so that a fit can vary them: after an edge, y changes by several times the noise per
+    /// sample.
     pub(crate) fn delay_between_samples(&mut self) {
         match &mut self.delay {
             Delay::Law(law) => law.interpolated = true,
@@ -340,7 +340,7 @@ impl Model {
         }
     }
 
-    /// Lengthens all delays by so many samples (or shortens them), if the law has a constant part.
+    /// Lengthens (or shortens) all delays by this many samples, if the law has a constant part.
     pub(crate) fn delay_later(&mut self, samples: f64) {
         match &mut self.delay {
             Delay::Fixed { delays } => {

@@ -11,7 +11,7 @@ pub struct Colour {
     pub pole: f64,
 }
 
-/// The standard deviations of a record's samples, which every colour shares.
+/// The standard deviations of a record's samples, which are the same for every colour.
 #[derive(Clone, Debug)]
 pub(super) struct Deviations {
     /// Reciprocal standard deviation of each sample.

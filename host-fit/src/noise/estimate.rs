@@ -11,12 +11,12 @@ const SHARES: [f64; 6] = [0.1, 0.25, 0.5, 0.75, 0.9, 0.98];
 const MEMORIES: [f64; 7] = [2.0, 5.0, 12.0, 30.0, 80.0, 200.0, 500.0];
 /// Smallest step in logit share and ln correlation time, relative to the grid's.
 const FINEST: f64 = 0.05;
-/// The first step from the colour of similar errors.
+/// The first step if the search starts from the colour of similar errors.
 const NEAR: f64 = 0.25;
 /// Most EM iterations for the variances; the gains decrease.
 const ROUNDS: usize = 60;
 
-/// One record as all colours see it.
+/// One record, with the quantities that every colour needs.
 struct Prepared<'a> {
     series: &'a Series,
     deviations: Deviations,
@@ -51,14 +51,14 @@ struct Best {
 }
 
 impl NoiseModel {
-    /// The noise model of the `errors` that a good model leaves. With `measured`, the variances are known and
-    /// the scale of ε is at least 1; otherwise only their ratios are known. Colour and random effects are
-    /// kept if they pay by BIC.
+    /// The noise model of the `errors` of a good model. With `measured`, the variances are known and the scale of ε
+    /// is at least 1; otherwise only their ratios are known. Colour and random effects are kept if they improve
+    /// BIC.
     #[must_use]
     pub fn of(errors: &[Series], measured: bool) -> Self {
         let samples: f64 = errors.iter().map(|e| e.residual.len() as f64).sum();
         let price = Price {
-            // Two more parameters must gain ln n.
+            // Two more parameters must increase the log-likelihood by ln n.
             colour: samples.max(1.0).ln(),
             random_effect: 0.5 * (errors.len().max(1) as f64).ln().max(1.0),
         };

@@ -24,8 +24,8 @@ pub struct Series {
     pub residual: Vec<f64>,
     /// Variance of the measurement noise per sample, y²; as many values, all above 0.
     pub variance: Vec<f64>,
-    /// Free run of the model, to which the level's random effect is proportional, y. The measurement would
-    /// not do: it contains the noise, which the effect would then absorb.
+    /// Free run of the model, to which the level's random effect is proportional, y. The measurement is not
+    /// suitable, because it contains the noise, which the effect would then absorb.
     pub run: Vec<f64>,
 }
 

@@ -133,7 +133,7 @@ fn offsets_drifts_and_levels_of_records_are_found_with_their_variance() {
     assert_eq!([none.offset, none.drift, none.level], [0.0; 3]);
 }
 
-/// From a colour elsewhere the search ends as high as from the grid.
+/// A search that starts from another colour reaches the same likelihood as the grid.
 #[test]
 fn a_search_from_a_similar_colour_ends_where_the_grid_does() {
     let mut rng = ChaCha8Rng::seed_from_u64(9);

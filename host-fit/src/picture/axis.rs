@@ -33,8 +33,7 @@ pub(super) fn extent(values: impl IntoIterator<Item = f64>) -> Option<(f64, f64)
 }
 
 impl Axis {
-    /// Linear axis over `range`, exactly; widened where it is too narrow to draw and
-    /// [0, 1] where there is none.
+    /// Linear axis over exactly `range`. It is widened if it is too narrow to draw, and [0, 1] without a range.
     pub(super) fn linear(range: Option<(f64, f64)>) -> Self {
         let (lo, hi) = match range {
             Some((a, b)) if a.abs() <= LARGEST && b.abs() <= LARGEST => (a.min(b), a.max(b)),
@@ -129,7 +128,7 @@ impl Axis {
             .collect()
     }
 
-    /// Ticks at 1, 2 and 5 times powers of ten, or at powers only if those are enough.
+    /// Ticks at 1, 2 and 5 times powers of ten, or only at powers if those suffice.
     fn decade_ticks(&self, count: usize) -> Vec<Tick> {
         let (first, last) = (self.lo.floor() as i32, self.hi.ceil() as i32);
         let at = |multiples: &[f64]| -> Vec<Tick> {

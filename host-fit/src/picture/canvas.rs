@@ -1,4 +1,4 @@
-//! One SVG document: lines, areas and words in pixels, placed to a tenth of one.
+//! One SVG document: lines, areas and text in pixels, with coordinates to a tenth of a pixel.
 
 use std::fmt::Write as _;
 
@@ -91,7 +91,7 @@ impl Ink {
     }
 }
 
-/// The drawing surface: a string, so that nothing can fail.
+/// The drawing surface: a string, so no operation can fail.
 pub(super) struct Canvas {
     elements: String,
 }
@@ -231,12 +231,12 @@ impl Canvas {
         ));
     }
 
-    /// Words at a point, centred on it vertically.
+    /// Text at a point, vertically centred on it.
     pub(super) fn text(&mut self, words: Words, at: (f64, f64), text: &str) {
         self.words(words, at, text, false);
     }
 
-    /// Words running upwards, centred on a point.
+    /// Text running upwards, centred on a point.
     pub(super) fn upright(&mut self, words: Words, at: (f64, f64), text: &str) {
         self.words(words.at(Anchor::Middle), at, text, true);
     }
@@ -300,7 +300,7 @@ fn list(points: &[(f64, f64)]) -> String {
     list
 }
 
-/// Estimated width of `text`, pixels; rather too large.
+/// Estimated width of `text`, pixels; an upper estimate.
 pub(super) fn text_width(text: &str, size: f64) -> f64 {
     text.chars()
         .map(|c| match c {
@@ -317,7 +317,7 @@ pub(super) fn text_width(text: &str, size: f64) -> f64 {
 
 /// `text`, shortened with an ellipsis if it is wider than `width` pixels.
 pub(super) fn fit(text: &str, size: f64, width: f64) -> String {
-    // Half a pixel of slack: callers compute `width` from this very text and round.
+    // Half a pixel of tolerance: callers compute `width` from the same text and round it.
     if text_width(text, size) <= width + 0.5 {
         return text.to_owned();
     }

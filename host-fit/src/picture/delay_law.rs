@@ -140,7 +140,7 @@ pub fn delay_law(plot: &DelayLawPlot<'_>) -> String {
         let x_label = match plot.unmeasured {
             0 => "Averaged output ỹ at the edge".to_owned(),
             n => format!(
-                "Averaged output ỹ at the edge   ({n} edges without a measurable response left out)"
+                "Averaged output ỹ at the edge   (without {n} edges that have no measurable response)"
             ),
         };
         panel.foot(canvas, &x_label);

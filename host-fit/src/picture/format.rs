@@ -1,6 +1,6 @@
 //! Formatting of numbers for readers.
 
-/// A time, s, as a number with the unit in which it is read.
+/// A time, s, as a number with a suitable unit.
 #[must_use]
 pub fn readable_time(seconds: f64) -> (f64, &'static str) {
     match seconds.abs() {
@@ -40,7 +40,7 @@ pub fn significant(value: f64, digits: usize) -> String {
         return "–".to_owned();
     }
     let digits = digits.clamp(1, 17);
-    // Rounded first: 0.99996 to three digits is 1, in the next decade. The largest numbers would round to
+    // Rounded first: 0.99996 to three digits is 1, in the next decade. Rounding the largest numbers would give
     // infinity.
     let rounded: f64 = format!("{value:.*e}", digits - 1).parse().unwrap_or(value);
     let rounded = if rounded.is_finite() { rounded } else { value };

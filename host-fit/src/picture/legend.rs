@@ -9,7 +9,7 @@ const ROW: f64 = 22.0;
 const SWATCH: f64 = 24.0;
 const GAP: f64 = 20.0;
 
-/// The sample of a series before its name.
+/// The sample of a series in the legend, before its name.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Swatch {
     Line(Colour),

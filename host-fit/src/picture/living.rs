@@ -152,7 +152,7 @@ impl Living {
         self
     }
 
-    /// As JSON that cannot end an HTML element.
+    /// As JSON without a sequence that ends an HTML element.
     #[must_use]
     pub fn json(&self) -> String {
         let json = serde_json::to_string(self).unwrap_or_else(|_| "{}".to_owned());
@@ -247,7 +247,7 @@ mod tests {
             &[("a", &runs), ("b", &runs), ("c", &runs)],
             |_| String::new(),
         );
-        // A dozen coordinates that change every few samples, as a noisy channel would.
+        // A dozen coordinates that change every few samples, like a noisy channel.
         for _ in 0..12 {
             let places = vec![(0..n / 5).map(|i| (Some((i % 30) as u16), 5)).collect(); 8];
             living.coordinate("c", "", &places);

@@ -1,13 +1,12 @@
 //! Pictures (SVG) and the report page (HTML).
 //!
-//! Every function takes plain data and returns the text of one self-contained
-//! document: no fonts to fetch, no network. Writing the file is the
-//! caller's business. Nothing here fails: missing, non-finite or absurd numbers
-//! leave gaps in a picture, they never stop it.
+//! Every function takes plain data and returns the text of one self-contained document, without external fonts or
+//! network access. The caller writes the file. Nothing here fails: missing or non-finite numbers leave gaps in a
+//! picture.
 //!
-//! The layout is ours, because panels that share a time axis and legends that never
-//! cover data are what chart libraries do not offer; what is left is to write a few
-//! SVG elements ([`canvas`](self)). Pages draw records with a script of their own ([`Living`]).
+//! The layout is our own, because chart libraries offer neither panels with a shared time axis nor legends that
+//! never cover data. The rest is a few SVG elements ([`canvas`](self)). Pages draw records with a script of their
+//! own ([`Living`]).
 
 mod axis;
 mod canvas;

@@ -18,7 +18,7 @@ pub struct LabelledRun<'a> {
     pub y: &'a [f64],
 }
 
-/// Contents of [`overlay`]. Slices may be shorter than the record; the rest is not drawn.
+/// Contents of [`overlay`]. Slices may be shorter than the record; the missing part is not drawn.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Overlay<'a> {
     /// Title; empty for none.
@@ -262,8 +262,7 @@ mod tests {
         };
         let svg = overlay(&plot);
         check(&svg);
-        // With the spike the measured line spans the panel; without it, it would stay within its lowest
-        // eighth.
+        // With the spike the measured line spans the panel; without it, the line stays within the lowest eighth.
         let document = roxmltree::Document::parse(&svg).unwrap();
         let heights = |points: &str| {
             let ys = points

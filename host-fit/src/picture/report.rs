@@ -53,7 +53,7 @@ pub enum Column<'a> {
     Number(&'a str),
 }
 
-/// Builder of a report. All text is escaped; `` `code` `` between backticks is set as code.
+/// Builder of a report. All text is escaped; text between backticks is set as code.
 ///
 /// ```
 /// use host_fit::picture::{Report, Tone};
@@ -71,7 +71,7 @@ pub struct Report {
     subtitle: String,
     body: String,
     sections: Vec<String>,
-    /// Sections in the table of contents: folded ones are not listed.
+    /// Sections in the table of contents; folded ones are not listed.
     listed: Vec<usize>,
     folds: usize,
     open: bool,
@@ -138,7 +138,7 @@ impl Report {
         self.push(format_args!("</div>\n"))
     }
 
-    /// One cell of [`Report::columns`] that holds several things; ends with [`Report::end_columns`].
+    /// One cell of [`Report::columns`] with several elements; ends with [`Report::end_columns`].
     pub fn cell(&mut self) -> &mut Self {
         self.push(format_args!("<div class=\"cell\">"))
     }
@@ -267,19 +267,20 @@ impl Report {
         self.push(format_args!("</figure>\n"))
     }
 
-    /// Records to be looked along: zoom, values, models on and off. Returns the group's name, for [`Report::bars`].
+    /// Interactive records: zoom, values, models on and off. Returns the group's name, for [`Report::bars`].
     pub fn living(&mut self, living: &Living) -> String {
         self.groups += 1;
         let name = format!("g{}", self.groups);
         self.push(format_args!(
-            "<div class=\"living\" id=\"{name}\"></div><noscript><p>Curves are drawn by this page's script, which is \
-             switched off.</p></noscript><script type=\"application/json\" id=\"{name}-data\">{}</script>\n",
+            "<div class=\"living\" id=\"{name}\"></div><noscript><p>The curves need this page's script, but \
+             scripts are switched off.</p></noscript><script type=\"application/json\" \
+             id=\"{name}-data\">{}</script>\n",
             living.json()
         ));
         name
     }
 
-    /// As [`Report::figure`], for a picture whose bars light up their samples in the records of the group that comes next.
+    /// As [`Report::figure`], for a picture whose bars mark their samples in the records of the following group.
     pub fn bars(&mut self, svg: &str, caption: &str) -> &mut Self {
         let group = self.groups + 1;
         let at = self.body.len();
@@ -293,7 +294,7 @@ impl Report {
         self
     }
 
-    /// Commands, generated code or a model, letter by letter.
+    /// Commands, generated code or a model, verbatim.
     pub fn code(&mut self, text: &str) -> &mut Self {
         self.push(format_args!("<pre>{}</pre>\n", escape(text)))
     }
@@ -357,7 +358,8 @@ impl Report {
     }
 }
 
-/// The workbench's page around `body`, which is HTML: the same looks, and a script that may ask the server it came from.
+/// The workbench's page around `body`, which is HTML: the same style, and a script that may send requests to its
+/// server.
 #[must_use]
 pub fn workbench_page(title: &str, body: &str) -> String {
     let policy = "; connect-src 'self'; base-uri 'none'; form-action 'none'";
@@ -386,7 +388,7 @@ fn page(title: &str, bundle: &Bundle, policy: &str, class: &str, body: &str) -> 
     )
 }
 
-/// `text` for HTML and XML; characters those forbid become U+FFFD.
+/// `text` for HTML and XML; characters that these forbid become U+FFFD.
 pub(super) fn escape(text: &str) -> String {
     let mut safe = String::with_capacity(text.len());
     for c in text.chars() {
@@ -539,7 +541,7 @@ mod tests {
     #[test]
     fn the_page_is_well_formed_and_fetches_nothing() {
         let html = sample();
-        // Void elements aside, the page is XML too: every tag is closed, in order.
+        // Apart from void elements, the page is XML too: every tag is closed, in order.
         let body = html.split_once("<body>").unwrap().1;
         let body = body.split_once("</body>").unwrap().0;
         let document = roxmltree::Document::parse(body).expect("balanced tags");

@@ -65,8 +65,8 @@ pub(super) fn strip(
     }
 }
 
-/// Left and right pixel of every stretch of blowing. A stretch is drawn at least half
-/// a pixel wide; stretches less than that apart share a bar, so their number is bounded.
+/// Left and right pixel of every interval of blowing. An interval is drawn at least half a pixel wide; intervals
+/// that are closer share a bar, so their number is bounded.
 fn bars(
     panel: &Panel,
     clock: Clock,
@@ -98,7 +98,7 @@ fn bars(
     bars
 }
 
-/// Columns for each of `lines` thinned lines, so that a picture keeps its size whatever it shows.
+/// Columns for each of `lines` thinned lines, so that the size of a picture does not depend on its contents.
 pub(super) fn columns(width: f64, lines: usize) -> usize {
     /// Points in all lines of a picture; a point takes 10 bytes.
     const POINTS: f64 = 20_000.0;

@@ -1,7 +1,7 @@
-//! What the tests of all pictures share.
+//! Helpers for the tests of all pictures.
 
-/// Asserts that `svg` is one well-formed picture of the common width, smaller than
-/// 300 kB, that fetches nothing and has only finite coordinates.
+/// Asserts that `svg` is one well-formed picture of the common width, smaller than 300 kB, that loads nothing from
+/// the network and has only finite coordinates.
 pub(super) fn check(svg: &str) {
     let document = roxmltree::Document::parse(svg).expect("well-formed XML");
     let root = document.root_element();

@@ -1,4 +1,4 @@
-//! Where a model fails: the residual's size along one coordinate after another.
+//! Where a model fails: the size of the residual along one coordinate after another.
 
 use super::axis::{Axis, extent};
 use super::canvas::{Anchor, Canvas, Ink, MARGIN, WIDTH, Words, draw, fit, text_width};
@@ -8,7 +8,7 @@ use super::overlay::named;
 use super::palette::{BLUE, INK, MUTED, VERMILLION};
 use super::panel::{Panel, left_edge};
 
-/// One bin of a coordinate. A bin with `from == to` stands for that one value.
+/// One bin of a coordinate. A bin with `from == to` contains a single value.
 #[derive(Clone, Copy, Debug)]
 pub struct FailureBin {
     /// Lower end, in the coordinate's unit.
@@ -24,13 +24,13 @@ pub struct FailureBin {
 /// The residual along one coordinate.
 #[derive(Clone, Debug, Default)]
 pub struct FailureView<'a> {
-    /// What the coordinate is, for example `"time since rising edge"`.
+    /// Name of the coordinate, for example `"time since rising edge"`.
     pub coordinate: String,
     /// Its unit; empty for none.
     pub unit: &'a str,
-    /// Share of the excess error the coordinate explains, cross-validated, 0 to 1.
+    /// Share of the error above the noise that the coordinate explains, cross-validated, 0 to 1.
     pub explained_fraction: Option<f64>,
-    /// Bins in ascending order; they are drawn equally wide, whatever they span.
+    /// Bins in ascending order; they are drawn equally wide.
     pub bins: &'a [FailureBin],
 }
 
@@ -108,7 +108,7 @@ pub fn where_it_fails(plot: &WhereItFails<'_>) -> String {
 fn small(canvas: &mut Canvas, panel: &Panel, index: usize, view: &FailureView<'_>, y_label: &str) {
     panel.frame(canvas, y_label);
     title(canvas, panel, view);
-    // The largest bin of a coordinate that explains nothing is chance, not a place.
+    // The largest bin of a coordinate that explains nothing is accidental.
     let worst = match view.explained_fraction {
         Some(share) if share < WORTH_MARKING => None,
         _ => worst(view.bins),
@@ -198,7 +198,7 @@ fn edges(canvas: &mut Canvas, panel: &Panel, bins: &[FailureBin], slot: f64) {
     }
 }
 
-/// Limits written with as few digits, from three on, as tell neighbours apart.
+/// Limits written with as few digits, at least three, as distinguish neighbours.
 fn distinct(limits: &[(f64, f64)]) -> Vec<(f64, String)> {
     let written = |digits| -> Vec<(f64, String)> {
         let label = |(at, limit): &(f64, f64)| (*at, super::significant(*limit, digits));
@@ -210,7 +210,7 @@ fn distinct(limits: &[(f64, f64)]) -> Vec<(f64, String)> {
         .unwrap_or_else(|| written(3))
 }
 
-/// Bin whose mean square is farthest above its floor.
+/// Bin whose mean square is farthest above the noise level.
 fn worst(bins: &[FailureBin]) -> Option<usize> {
     let floor = |b: &FailureBin| {
         if b.noise_rmse.is_finite() {

@@ -1,5 +1,5 @@
-//! How a record begins: at rest under a constant command, with an edge of the command at its first sample, or in
-//! mid-run.
+//! The beginning of a record: at rest under a constant command, with an edge of the command at its first sample, or
+//! in mid-run.
 
 use super::RULES;
 use super::levels::two_levels;
@@ -12,9 +12,9 @@ use crate::order;
 pub(super) struct Beginning {
     /// The command before the first sample.
     pub(super) command: f64,
-    /// First samples through which y rests; 0 in mid-run.
+    /// Number of samples from the start during which y rests; 0 in mid-run.
     pub(super) rest: usize,
-    /// First samples that may answer commands before the record; 0 where those are known.
+    /// Number of samples from the start that may be responses to commands before the record; 0 if those are known.
     pub(super) follow: usize,
 }
 
@@ -36,8 +36,8 @@ impl Rest {
         }
     }
 
-    /// Whether `y`, of which this is the level, rests there rather than relax towards `end`: at none of these time constants
-    /// does that leave about as little.
+    /// Whether `y`, whose mean is this level, rests there instead of relaxing towards `end`. It rests if a
+    /// relaxation with any of these time constants has a clearly larger residual.
     fn is_settled(&self, y: &[f64], end: f64, times: [f64; 3]) -> bool {
         let n = y.len() as f64;
         let constant = self.error.powi(2) * n * (n - 1.0).max(1.0);
@@ -54,7 +54,7 @@ impl Rest {
         })
     }
 
-    /// Whether both are the same but for noise: within three standard errors.
+    /// Whether the two levels are equal within three standard errors of the noise.
     fn is_at_level_of(&self, other: &Self) -> bool {
         (self.level - other.level).abs() <= 3.0 * self.error.hypot(other.error)
     }
@@ -64,7 +64,7 @@ impl Rest {
 struct Shape {
     /// Sum of squares that it leaves.
     left: f64,
-    /// Sum of squares of the motion that it describes.
+    /// Sum of squares of the motion that the fit describes.
     motion: f64,
 }
 
@@ -95,7 +95,7 @@ impl Shape {
 }
 
 impl Beginning {
-    /// How `record`, one of `set`, begins, judged by the response of `reference`.
+    /// The beginning of `record`, one of `set`, determined with the response of `reference`.
     pub(super) fn of(record: &Record, set: &[Record], reference: Option<&FirstOrder>) -> Self {
         let first = record.u.first().copied().unwrap_or(0.0);
         let held = record.u_before.unwrap_or(first);
@@ -107,10 +107,10 @@ impl Beginning {
         let (dead_time, time) = (reference.dead_time, reference.time_constant);
         let changes = |u: &f64| (u - first).abs() > 1e-9 * first.abs().max(1e-9);
         let change = record.u.iter().position(changes).unwrap_or(record.len());
-        // An edge at the first sample is felt before one that the record shows.
+        // The response to an edge at the first sample comes before that to the first edge within the record.
         let known_edge = (held - first).abs() > 1e-9 * first.abs().max(1e-9);
         let edge = if known_edge { 0 } else { change };
-        // What is switched beside the command may act at once.
+        // A switched input other than the command may act without delay.
         let other = record.channels.values().filter_map(|v| first_switch(v));
         let other = other.min().unwrap_or(record.len());
         let felt = |edge: usize| {
@@ -150,7 +150,7 @@ impl Beginning {
             });
             each.min_by(|a, b| a.1.left.total_cmp(&b.1.left))
         };
-        // Which of the two it is shows where the answer has not begun yet, or has just begun.
+        // The samples before or just after the start of the response decide between the two.
         let early = &y[..window.min((RULES.early * dead_time).ceil() as usize + 5)];
         let (Some(relaxes), Some(relaxes_early)) = (relaxing(y), relaxing(early)) else {
             return in_mid_run(dead_time, time);
@@ -172,10 +172,11 @@ impl Beginning {
             _ => &relaxes,
         };
         if !moves(best) {
-            // What does not move by then stays at rest until an edge is felt.
+            // If y does not move by then, it rests until the response to an edge begins.
             return at_rest(held, felt(edge).min(record.len()));
         }
-        // An answer to the record's own first edge that comes sooner than the reference has it, as that of a second order.
+        // A response to the record's own first edge that begins earlier than in the reference, for example that of
+        // a second-order plant.
         let sooner = [0.0, 0.15, 0.3, 0.45].map(|share| edge as f64 + share * dead_time);
         let sooner = sooner.into_iter().flat_map(|at| {
             let answer = move |k: usize, time: f64| 1.0 - (-(k as f64 - at).max(0.0) / time).exp();
@@ -187,13 +188,14 @@ impl Beginning {
         {
             return at_rest(held, edge);
         }
-        // An answer to an edge at the first sample, of a command of two levels.
+        // A response to an edge at the first sample, of a command with two levels.
         let other = two_levels(set).and_then(|levels| levels.into_iter().find(|u| *u != first));
         if let (Some((at, answer)), Some(other)) = (&answers_early, other)
             && !known_edge
             && record.u_before.is_none()
             && answer.left < RULES.answer * relaxes_early.left
-            // An earlier response is that of an edge before the record; in doubt the record begins in mid-run.
+            // An earlier response belongs to an edge before the record; in case of doubt the record begins in
+            // mid-run.
             && *at >= 0.5 * (1.0 + RULES.surely_before) * dead_time
         {
             let rest = ((RULES.surely_before * at).floor() as usize).max(1);
@@ -207,8 +209,8 @@ impl Beginning {
         in_mid_run(dead_time, time)
     }
 
-    /// A beginning in mid-run behind a command of `held`: what is on its way is followed to its arrival, what is slower
-    /// for as long as a record bears it.
+    /// A beginning in mid-run after a command of `held`. Responses that are still in the dead time are followed
+    /// until they arrive, slower ones for as long as the length of the record allows.
     fn in_mid_run(record: &Record, held: f64, dead_time: f64, time: f64) -> Self {
         let most = record.len() / RULES.most_followed;
         let share = record.len() / RULES.followed_share;
@@ -221,8 +223,9 @@ impl Beginning {
         }
     }
 
-    /// Where records were cut out of a run, an edge near the first sample of one that rests may have been before it, and nobody
-    /// recorded when: what answers it is followed, as in mid-run, where the record shows further edges.
+    /// In records that were cut out of a longer run, an edge near the first sample of a resting record may have
+    /// occurred before it, at an unknown time. The response to it is followed, as in mid-run, if the record has
+    /// further edges.
     pub(super) fn distrust(beginnings: &mut [Self], records: &[Record], reference: &FirstOrder) {
         if beginnings.iter().all(|own| own.follow == 0) {
             return;
@@ -241,11 +244,12 @@ impl Beginning {
         }
     }
 
-    /// Takes rests that are too short to be sure of for what they are: where records rest at different levels under the
-    /// same command, or one rests elsewhere than the response to its command ends, something is still on its way. Those
-    /// that show less than a motion takes begin in mid-run then, unless they last a time constant and lie too still to be on
-    /// their way there (their zero has moved), or three of them, and more than half of all, rest at the level of their
-    /// middle one as far as noise lets it be known: two may agree by chance.
+    /// Re-examines rests that are too short to be certain. If records rest at different levels under the same
+    /// command, or if one rests away from the level where the response to its command ends, a response is still in
+    /// progress. Records with a rest shorter than a motion then begin in mid-run, with two exceptions. The first is
+    /// a rest of at least a time constant that is too still for a response in progress: its offset has changed. The
+    /// second is a group of at least three rests, more than half of all, at the level of their median within the
+    /// noise; two rests could agree accidentally.
     pub(super) fn reconcile(beginnings: &mut [Self], records: &[Record], reference: &FirstOrder) {
         let time = reference.time_constant;
         let times = [0.5, 1.0, 2.0].map(|factor| factor * time);
@@ -264,12 +268,12 @@ impl Beginning {
                 .map(|(_, rest, y)| (*rest, *y))
                 .collect();
             order::ascending(&mut same, |(rest, _)| rest.level);
-            // Pairs would differ by chance the more often the more records there are; few differ from their middle one.
+            // With more records, more pairs differ accidentally; only a few records differ from their median.
             let middle = same[(same.len() - 1) / 2].0;
             (same, middle)
         };
         let apart = RULES.rests_apart * range_of_y(records);
-        // A response to the command alone does not say where records end in which another input is switched.
+        // If another input is switched, a response to the command alone does not say where the records end.
         let mut channels = records.iter().flat_map(|record| record.channels.values());
         let alone = !channels.any(|channel| first_switch(channel).is_some());
         for ((own, record), rest) in beginnings.iter_mut().zip(records).zip(&rests) {
@@ -293,7 +297,7 @@ impl Beginning {
             let [low, high] = levels.fold([middle.level; 2], |[low, high], level| {
                 [low.min(level), high.max(level)]
             });
-            // Three times the rms that the reference leaves: it describes no flow exactly.
+            // Three times the rms residual of the reference, because it describes no flow exactly.
             let from_end = (rest.level - reference.at_rest(*command)).abs();
             let is_elsewhere = alone && from_end > apart + 3.0 * reference.left_rms;
             let on_its_way = high - low > apart || is_elsewhere;
@@ -303,8 +307,9 @@ impl Beginning {
         }
     }
 
-    /// Takes a record that begins where others rest under the other level of the command, and not where the response to its
-    /// own first command ends, for one that rests there with an edge near its first sample.
+    /// Treats a record as one that begins at rest with an edge near its first sample, if it begins at the level
+    /// where others rest under the other level of the command, and not where the response to its own first command
+    /// ends.
     pub(super) fn recognise(beginnings: &mut [Self], records: &[Record], reference: &FirstOrder) {
         let Some(levels) = two_levels(records) else {
             return;
@@ -352,7 +357,7 @@ impl Beginning {
         self.rest > 0 && self.command == level
     }
 
-    /// The record with what is known of its beginning.
+    /// The record with the values before its first sample.
     pub(super) fn filled_in(&self, record: &Record) -> Record {
         let mut record = record.clone();
         record.u_before.get_or_insert(self.command);
@@ -364,7 +369,7 @@ impl Beginning {
     }
 }
 
-/// The sample at which a channel changes first, if it is switched: it keeps each value for many samples.
+/// The first change of a channel that is switched, i.e. that keeps each value for many samples.
 fn first_switch(channel: &[f64]) -> Option<usize> {
     let changes = channel.windows(2).filter(|pair| pair[0] != pair[1]).count();
     let is_switched = changes * RULES.switched < channel.len();
@@ -372,7 +377,7 @@ fn first_switch(channel: &[f64]) -> Option<usize> {
     is_switched.then(changed)?
 }
 
-/// The distance from the least y of all records to the largest.
+/// The difference of the largest and the smallest y of all records.
 pub(super) fn range_of_y(records: &[Record]) -> f64 {
     let all = || records.iter().flat_map(|r| r.y.iter().copied());
     all().fold(f64::NEG_INFINITY, f64::max) - all().fold(f64::INFINITY, f64::min)
@@ -383,7 +388,8 @@ mod tests {
     use super::*;
     use crate::data::Use;
 
-    /// The response of a first order with a dead time of 10 and a time constant of 30 samples to `u`, which was 0 before.
+    /// The response of a first-order plant with a dead time of 10 and a time constant of 30 samples to `u`, which
+    /// was 0 before.
     fn response(u: &[f64]) -> Vec<f64> {
         let mut y = vec![0.0; u.len()];
         for k in 1..u.len() {
@@ -421,7 +427,7 @@ mod tests {
         let mut record = Record::new("r", Use::Identify, 0.001, u, y);
         let fan = (0..900).map(|k| f64::from(u8::from(k >= 80))).collect();
         record.channels.insert("fan".to_owned(), fan);
-        // What changes at every sample is measured, not switched.
+        // A channel that changes at every sample is measured, not switched.
         let wanders = (0..900).map(f64::from).collect();
         record.channels.insert("wanders".to_owned(), wanders);
         let records = [record];
@@ -430,7 +436,7 @@ mod tests {
         assert_eq!((own.rest, own.follow), (80, 0));
     }
 
-    /// The reference of a second order has a longer dead time than that of its first motion.
+    /// The reference of a second-order plant has a longer dead time than its first motion.
     #[test]
     fn a_record_that_answers_its_edge_sooner_than_the_reference_rests_until_the_edge() {
         let u: Vec<f64> = (0..900)
@@ -444,7 +450,7 @@ mod tests {
         };
         let own = Beginning::of(&records[0], &records, Some(&late));
         assert_eq!((own.rest, own.follow), (20, 0));
-        // One that relaxes from the start is in mid-run.
+        // A record that relaxes from its start begins in mid-run.
         let mut relaxing = records.clone();
         for (k, y) in relaxing[0].y.iter_mut().enumerate() {
             *y = (-(k as f64) / 30.0).exp();
@@ -453,7 +459,8 @@ mod tests {
         assert!(own.follow > 0, "{own:?}");
     }
 
-    /// Rests of more than a time constant that lie still do so at their own zero; what moves is on its way.
+    /// Rests of more than a time constant that are still have their own offset; records that move contain a
+    /// response in progress.
     #[test]
     fn a_zero_that_moved_is_no_motion() {
         let command: Vec<f64> = (0..900)
@@ -477,7 +484,7 @@ mod tests {
         let mut beginnings = [rests; 3];
         Beginning::reconcile(&mut beginnings, &records, &reference);
         assert_eq!(beginnings, [rests; 3]);
-        // The second relaxes to where the first rests.
+        // The second record relaxes to the level at which the first rests.
         let mut relaxing = records.clone();
         for (k, y) in relaxing[1].y.iter_mut().enumerate() {
             *y += 0.3 * (-(k as f64) / 30.0).exp() - 0.1;
@@ -511,8 +518,8 @@ mod tests {
         assert!(beginnings[1].follow > 0, "{beginnings:?}");
     }
 
-    /// The jet was opened a sample before the second record and closed before y had answered, so that y still lies where it
-    /// rests without it.
+    /// The jet was opened a sample before the second record and closed before y had responded. y is therefore still
+    /// at its level of rest without jet.
     #[test]
     fn an_edge_before_the_record_is_recognised_and_its_answer_is_not_scored() {
         let command: Vec<f64> = (0..1500)
@@ -529,7 +536,7 @@ mod tests {
         let mut beginnings = records
             .each_ref()
             .map(|r| Beginning::of(r, &records, Some(&reference)));
-        // It lies still under its first command until that is felt.
+        // y is still under its first command until the response begins.
         assert_eq!((beginnings[1].command, beginnings[1].follow), (1.0, 0));
         Beginning::reconcile(&mut beginnings, &records, &reference);
         Beginning::recognise(&mut beginnings, &records, &reference);
@@ -543,7 +550,7 @@ mod tests {
         assert_eq!((beginnings[0].command, beginnings[0].follow), (0.0, 0));
         let edge_before = beginnings[1];
         assert!(edge_before.command == 0.0 && edge_before.rest > 0 && edge_before.follow > 20);
-        // Without further edges its answer is all there is to score.
+        // Without further edges only its response can be scored.
         let short = Record {
             u: records[1].u[..200].to_vec(),
             ..records[1].clone()

@@ -1,4 +1,4 @@
-//! Which commands of a data set are no jet and a full one.
+//! The commands of a data set that mean no jet and a full jet.
 
 use super::RULES;
 use super::beginning::Beginning;
@@ -9,9 +9,9 @@ use crate::model::CommandRange;
 
 /// The range of the command of `records`.
 ///
-/// Of two levels, no jet is the lower one if y rises with u, or if records rest under it; otherwise it is the upper one
-/// (a normally open valve, an inverted relay). Graded commands are shares of a full jet where they reach far enough
-/// into 0 … 1; otherwise their range is measured.
+/// Of two levels, no jet is the lower one if y rises with u, or if records rest under it. Otherwise it is the upper
+/// one (a normally open valve, an inverted relay). Graded commands are fractions of a full jet if they cover enough
+/// of 0 … 1; otherwise their range is used.
 pub(super) fn range_of(
     records: &[Record],
     beginnings: &[Beginning],

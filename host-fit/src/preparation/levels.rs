@@ -1,8 +1,8 @@
-//! Whether a command takes two levels only.
+//! Whether a command has only two levels.
 
 use crate::data::Record;
 
-/// The two levels of a command that takes no others, the lower first.
+/// The two levels of a command that has no others, the lower first.
 pub(super) fn two_levels(records: &[Record]) -> Option<[f64; 2]> {
     let all = || records.iter().flat_map(|r| r.u.iter().copied());
     let low = all().fold(f64::INFINITY, f64::min);

@@ -1,8 +1,8 @@
-//! What is decided about records before any model: where they rest, what the command was before them, which of their
-//! samples are scored, what zero and size of command and response are.
+//! Properties of the records that are determined before any model: where they rest, the command before them, the
+//! scored samples, and zero and size of command and response.
 //!
-//! Everything here comes from the data alone, so that all hypotheses of a command are run over the same records, from
-//! the same beginnings, and scored on the same samples.
+//! All of these come from the data alone. Every hypothesis of a command is therefore simulated from the same
+//! beginnings and scored on the same samples.
 
 mod beginning;
 mod command;
@@ -23,35 +23,36 @@ use beginning::Beginning;
 use smoothing::{Slow, slow_part, smoothed};
 use std::fmt::Write as _;
 
-/// Records made ready, and what that found.
+/// Prepared records, with the properties found.
 #[derive(Clone, Debug)]
 pub struct Preparation {
-    /// The records: what was before their first sample and what of them is scored is filled in, and each is taken from
-    /// its own zero where that moves.
+    /// The records, with the signals before their first sample and the range of scored samples. If the sensor's
+    /// offset varies, each record's own offset is subtracted.
     pub records: Vec<Record>,
     /// The command of no jet and of a full one, in the unit of u.
     pub command: CommandRange,
-    /// Whether a full jet of that range is one of the rig, and not only the largest command of the records.
+    /// Whether a full jet of that range is one of the rig, not only the largest command of the records.
     pub full_is_known: bool,
-    /// y where the sensor shows nothing: where records rest under no command, or an estimate of that.
+    /// The reading without friction gain, y: the level of rest without jet, or an estimate of it.
     pub zero: f64,
-    /// Whether every record begins at rest under no command.
+    /// Whether every record begins at rest without jet.
     pub at_rest: bool,
-    /// The zero that differs between records, where it does.
+    /// The offset that differs between records, if it does.
     pub moving_zero: Option<MovingZero>,
-    /// The first-order response that stands behind these decisions; none where u and y are unrelated.
+    /// The first-order response on which these decisions are based; `None` if u and y are unrelated.
     pub reference: Option<FirstOrder>,
 }
 
 impl Preparation {
-    /// Prepares `records`; what a file says of a record's beginning stays as it is.
+    /// Prepares `records`; what their files state about the beginning is not changed.
     #[must_use]
     pub fn of(records: &[Record]) -> Self {
         let prepared = Self::as_read(records);
         if prepared.moving_zero.is_some() {
             return prepared;
         }
-        // Rests too short to tell a zero from a relaxation: by the response through whole records.
+        // If rests are too short to distinguish an offset from a relaxation, offsets are estimated by the response
+        // through whole records.
         let Some((moving, tared)) = MovingZero::by_response(records) else {
             return prepared;
         };
@@ -61,7 +62,7 @@ impl Preparation {
         }
     }
 
-    /// Prepares `records` with their zeros as they are, but for what their rests say of them.
+    /// Prepares `records` without correcting their offsets beyond those of their rests.
     fn as_read(records: &[Record]) -> Self {
         let reference = FirstOrder::fitted(records);
         let mut beginnings: Vec<Beginning> = records
@@ -101,7 +102,7 @@ impl Preparation {
         }
     }
 
-    /// What the user should know of it, one sentence each.
+    /// Remarks for the user, one sentence each.
     #[must_use]
     pub fn remarks(&self) -> Vec<String> {
         let mut remarks = Vec::new();
@@ -135,10 +136,10 @@ impl Preparation {
     }
 }
 
-/// Sets the output from which free runs start in records that begin in mid-run: the response of a second order with dead
-/// time whose initial state is fitted to the start of the record, plus the slow part of the residual of y against that
-/// response, where it has one (theory 1.5). Single samples are too noisy to give the slope of y, and smoothing y itself would be
-/// biased after edges.
+/// Sets the output from which free runs start in records that begin in mid-run. It is the response of a
+/// second-order plant with dead time whose initial state is fitted to the start of the record, plus the slow part
+/// of the residual of y against that response, if there is one (theory 1.5). Single samples are too noisy to give
+/// the slope of y, and smoothing y itself would be biased after edges.
 fn follow(records: &mut [Record], beginnings: &[Beginning]) {
     if beginnings.iter().all(|own| own.follow == 0) {
         return;
@@ -154,7 +155,8 @@ fn follow(records: &mut [Record], beginnings: &[Beginning]) {
         let run = second.and_then(|second| second.simulate(record));
         let run = run.unwrap_or_else(|| vec![0.0; record.len()]);
         let left: Vec<f64> = record.y.iter().zip(&run).map(|(y, run)| y - run).collect();
-        // During the first dead time y answers commands that were not recorded, so the response is not valid there.
+        // During the first dead time y responds to commands that were not recorded, so the fitted response is not
+        // valid there.
         let answered = second.map_or(0.0, |second| second.dead_time_s / record.sample_period_s);
         let from = (answered.ceil() as usize + 1).min(follow / 2);
         let slow = slow_part(&left[from..], 0..follow - from);

@@ -1,11 +1,11 @@
-//! The first-order response with dead time that describes records best: what tells rest from motion, and how long
-//! an edge of the command takes to be felt.
+//! The first-order response with dead time that describes the records best. It serves to distinguish rest from
+//! motion and to estimate when the response to an edge begins.
 
 use super::RULES;
 use crate::data::Record;
 use crate::parallel;
 
-/// y = level + gain·x with x_{k+1} = x_k + (1 − e^{−1/T})(u_{k−θ} − x_k), an initial state of each record aside.
+/// y = level + gain·x with x_{k+1} = x_k + (1 − e^{−1/T})(u_{k−θ} − x_k), plus an initial state for each record.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FirstOrder {
     /// θ, samples, ≥ 0.
@@ -20,7 +20,7 @@ pub struct FirstOrder {
     pub explained: f64,
     /// What it leaves, y rms.
     pub left_rms: f64,
-    /// What of that is not the same throughout a record, y rms.
+    /// Residual without the part that is constant within a record, y rms.
     pub varying_rms: f64,
 }
 
@@ -47,7 +47,7 @@ impl Thinned {
     }
 }
 
-/// Sums of products of 1, x and y, what an initial state explains taken off.
+/// Sums of products of 1, x and y, after projecting out an initial state.
 #[derive(Clone, Copy, Default)]
 struct Moments {
     one: f64,
@@ -59,7 +59,7 @@ struct Moments {
 }
 
 impl FirstOrder {
-    /// Fits the response to `records` by least squares over a grid that is refined; `None` where y does not follow u.
+    /// Fits the response to `records` by least squares over a refined grid; `None` if y does not follow u.
     #[must_use]
     pub fn fitted(records: &[Record]) -> Option<Self> {
         let total: usize = records.iter().map(Record::len).sum();
@@ -144,7 +144,7 @@ fn whole_spread(records: &[Thinned]) -> f64 {
     all().map(|y| (y - mean).powi(2)).sum()
 }
 
-/// Sum of squares that the response leaves, with its level and gain.
+/// Residual sum of squares of the response, with its level and gain.
 fn residual(records: &[Thinned], delay: f64, time: f64) -> (f64, f64, f64) {
     let mut sums = Moments::default();
     for record in records {
@@ -166,7 +166,7 @@ fn residual(records: &[Thinned], delay: f64, time: f64) -> (f64, f64, f64) {
     (left.max(0.0), level, gain)
 }
 
-/// The moments of a record, without what an initial state that fades explains.
+/// The moments of a record, after projecting out a decaying initial state.
 fn moments(record: &Thinned, delay: f64, time: f64) -> Moments {
     let whole = delay.floor();
     let (fraction, lag) = (delay - whole, whole as usize);
@@ -204,7 +204,7 @@ mod tests {
     use super::*;
     use crate::data::Use;
 
-    /// A first order with dead time that begins at `start`, at a level of 20.
+    /// A first-order plant with dead time that begins at `start`, at a level of 20.
     fn record(dead_time: usize, time: f64, start: f64, samples: usize) -> Record {
         let u: Vec<f64> = (0..samples)
             .map(|k| f64::from(u8::from(k / 90 % 2 == 1)))

@@ -1,4 +1,4 @@
-//! Where y rests before anything is blown: the sensor's zero, and whether it moves.
+//! The level of y at rest without jet: the sensor's offset, and whether it varies between records.
 
 use super::RULES;
 use super::beginning::{Beginning, range_of_y};
@@ -27,14 +27,14 @@ struct Rests<'a> {
 struct Noise {
     /// Its variance.
     within: f64,
-    /// Samples that are worth one independent one.
+    /// Number of samples per independent sample.
     dependence: f64,
     /// Degrees of freedom of the variance, in independent samples.
     freedom: f64,
 }
 
 impl Noise {
-    /// That of `deviations` from the mean of each.
+    /// Estimates it from the `deviations` from the mean of each series.
     fn of(deviations: &[Vec<f64>]) -> Self {
         let samples: usize = deviations.iter().map(Vec::len).sum();
         let squares: f64 = deviations.iter().flatten().map(|d| d * d).sum();
@@ -46,14 +46,14 @@ impl Noise {
         }
     }
 
-    /// Variance of the mean of so many samples.
+    /// Variance of the mean of this many samples.
     fn error_of(&self, samples: usize) -> f64 {
         self.within * self.dependence / samples as f64
     }
 }
 
 impl<'a> Rests<'a> {
-    /// Those of `records` that rest under a command of `off`; none without any.
+    /// Finds those of `records` that rest under a command of `off`; `None` if none does.
     fn of(records: &'a [Record], beginnings: &[Beginning], off: f64) -> Option<Self> {
         let pairs = records.iter().zip(beginnings);
         let rests: Vec<(&Record, &[f64])> = pairs
@@ -88,8 +88,8 @@ impl<'a> Rests<'a> {
     }
 }
 
-/// 1 + 2·Σ ρ_k over the lags at which the autocorrelation of all `deviations` together is positive in pairs (the initial
-/// positive sequence of Geyer 1992): the variance of a mean, relative to that of independent samples.
+/// 1 + 2·Σ ρ_k over the lags at which the autocorrelation of all `deviations` together is positive in pairs (the
+/// initial positive sequence of Geyer 1992). It is the variance of a mean relative to that of independent samples.
 fn dependence(deviations: &[Vec<f64>]) -> f64 {
     let longest = deviations.iter().map(Vec::len).max().unwrap_or(0);
     let at = |lag: usize| {
@@ -112,13 +112,13 @@ fn dependence(deviations: &[Vec<f64>]) -> f64 {
 struct NoiseAtRest {
     /// All of it.
     whole: f64,
-    /// What of it the rests do not show within themselves: noise that is slower than they are long.
+    /// The part of the noise that is not visible within the rests, because it is slower than they are long.
     slower: f64,
 }
 
 impl NoiseAtRest {
-    /// By the standard errors of y; where a record does not say them, by what the reference response leaves of y, `left`,
-    /// which is no less.
+    /// Estimated from the standard errors of y. For a record without them, the residual of the reference response,
+    /// `left`, is an upper limit.
     fn of(rests: &Rests, left: impl FnOnce() -> f64) -> Self {
         let stated: Option<Vec<f64>> = rests
             .rests
@@ -133,7 +133,7 @@ impl NoiseAtRest {
             || left().powi(2),
             |sums| sums.iter().sum::<f64>() / samples as f64,
         );
-        // Of a variance of so many samples.
+        // Estimates it for a variance of this many samples.
         let error = (2.0 / samples as f64).sqrt();
         let slower = (1.0 - RULES.slower_by_chance * error) * whole - rests.noise.within;
         Self {
@@ -143,8 +143,8 @@ impl NoiseAtRest {
     }
 }
 
-/// Mean y of the records while they rest under a command of `off`, 0 where it is that but for chance; none where none
-/// of them does.
+/// Mean y of the records while they rest under a command of `off`, or 0 if the mean is not significantly different
+/// from 0. `None` if no record rests.
 pub(super) fn level_of_rest(records: &[Record], beginnings: &[Beginning], off: f64) -> Option<f64> {
     let rests = Rests::of(records, beginnings, off)?;
     let samples: Vec<f64> = rests
@@ -153,14 +153,14 @@ pub(super) fn level_of_rest(records: &[Record], beginnings: &[Beginning], off: f
         .flat_map(|(_, y)| y.iter().copied())
         .collect();
     let (mean, error) = (mean(&samples), rests.noise.error_of(samples.len()).sqrt());
-    // Sums of records without noise are 0 but for their rounding.
+    // Sums over records without noise differ from 0 only by rounding errors.
     let whole = rests.rests.iter().flat_map(|(record, _)| &record.y);
     let largest = whole.fold(0.0, |m: f64, y| m.max(y.abs()));
     let is_off = mean.abs() > RULES.off_zero * error && mean.abs() > 1e-12 * largest;
     Some(if is_off { mean } else { 0.0 })
 }
 
-/// y under no command where no record rests under it: by the reference response, and 0 where that is near.
+/// y without jet if no record rests without jet: from the reference response, and 0 if that is close to 0.
 pub(super) fn estimated_zero(
     records: &[Record],
     command: CommandRange,
@@ -178,7 +178,7 @@ pub(super) fn estimated_zero(
     }
 }
 
-/// 0, or the mean of y where 0 is outside the values of y.
+/// 0, or the mean of y if 0 is outside the range of y.
 fn far_level(records: &[Record]) -> f64 {
     let all = || records.iter().flat_map(|r| r.y.iter().copied());
     let low = all().fold(f64::INFINITY, f64::min);
@@ -190,7 +190,7 @@ fn far_level(records: &[Record]) -> f64 {
     }
 }
 
-/// What the response of a second order with dead time leaves of y that is not the same throughout a record, rms.
+/// Residual of the response of a second-order plant with dead time, without its mean over each record, rms.
 pub(super) fn left_by_second_order(records: &[Record]) -> Option<f64> {
     let learning = || records.iter().filter(|r| r.role == Use::Identify);
     let second = Baselines::fit(&learning().collect::<Vec<&Record>>()).sopdt?;
@@ -198,25 +198,26 @@ pub(super) fn left_by_second_order(records: &[Record]) -> Option<f64> {
     Some(Noise::of(&deviations).within.sqrt())
 }
 
-/// A zero of the sensor that is not the same in all records.
+/// An offset of the sensor that varies between records.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MovingZero {
-    /// The record that rests lowest, and where, y.
+    /// The record that rests lowest, and its level, y.
     pub lowest: (String, f64),
-    /// The record that rests highest, and where, y.
+    /// The record that rests highest, and its level, y.
     pub highest: (String, f64),
     /// Variance of the zeros themselves.
     zeros: f64,
-    /// Variance of noise that is the same throughout a rest.
+    /// Variance of noise that is constant throughout a rest.
     slower: f64,
-    /// Whether rests show it, and not whole records.
+    /// Whether it was found from rests, instead of whole records.
     by_rests: bool,
 }
 
 impl MovingZero {
-    /// Whether records rest at different levels under a command of `off`: by more than chance, and by more than slow
-    /// noise makes of a rest; or by half as much, if they creep from each record to the next as chance seldom does. `left`
-    /// gives the rms of what the reference responses leave of y within records; it is asked where y_sd is not stated.
+    /// Whether records rest at different levels under a command of `off`. The difference must be significant and
+    /// larger than slow noise explains. Half of that suffices if the levels drift from record to record with a
+    /// significant order. `left` gives the rms residual of the reference responses within records; it is used if
+    /// y_sd is not stated.
     pub(super) fn of(
         records: &[Record],
         beginnings: &[Beginning],
@@ -252,7 +253,7 @@ impl MovingZero {
     }
 }
 
-/// The mean of what `second` leaves of y, record by record, and the deviations from it.
+/// The mean residual of `second`, record by record, and the deviations from it.
 fn left_by<'a>(
     second: &SecondOrder,
     records: impl Iterator<Item = &'a Record>,
@@ -269,9 +270,10 @@ fn left_by<'a>(
 }
 
 impl MovingZero {
-    /// As [`MovingZero::of`], with levels by the second-order response through whole records, and the records without them.
-    /// Only where that response leaves a constant of each record and noise with hardly a memory: what a constant cannot be
-    /// but a zero. Records with y_sd are left to their rests.
+    /// As [`MovingZero::of`], but with levels from the second-order response through whole records; returns also
+    /// the corrected records. It applies only if the residual of that response is a constant per record plus noise
+    /// with almost no memory, because such a constant can only be an offset. Records with y_sd are judged by their
+    /// rests alone.
     pub(super) fn by_response(records: &[Record]) -> Option<(Self, Vec<Record>)> {
         if records.len() < 2 || records.iter().any(|record| record.y_sd.is_some()) {
             return None;
@@ -279,7 +281,7 @@ impl MovingZero {
         let mut tared = records.to_vec();
         let mut zeros = vec![0.0; records.len()];
         let mut last = f64::INFINITY;
-        // Zeros bias the response that they are read from: each round takes most of the bias that is left.
+        // Offsets bias the response from which they are estimated; each round removes most of the remaining bias.
         let (second, noise) = loop {
             let learning: Vec<&Record> = tared.iter().filter(|r| r.role == Use::Identify).collect();
             let second = Baselines::fit(&learning).sopdt?;
@@ -317,8 +319,8 @@ impl MovingZero {
     }
 }
 
-/// The p-value of no scatter of the levels beside what noise makes of each, by the ratio of the variances (F-test), and the
-/// variance of that scatter. `slower` is the variance of noise that is the same throughout a rest. None of fewer than two
+/// The p-value of the hypothesis that the levels differ only by the noise of each (F-test), and the variance of
+/// their scatter. `slower` is the variance of noise that is constant throughout a rest. `None` for fewer than two
 /// records.
 fn between(noise: &Noise, levels: &[f64], lengths: &[usize], slower: f64) -> Option<(f64, f64)> {
     let n = levels.len() as f64;
@@ -332,14 +334,15 @@ fn between(noise: &Noise, levels: &[f64], lengths: &[usize], slower: f64) -> Opt
     (!ratio.is_nan()).then(|| (test.sf(ratio), (between - chance).max(0.0)))
 }
 
-/// Whether levels follow the order of the records, which is that of the recording as a rule.
+/// Whether levels follow the order of the records, which usually is the order of the recording.
 fn creeps(levels: &[f64]) -> bool {
     let order: Vec<f64> = (0..levels.len()).map(|index| index as f64).collect();
     correlation(&order, levels).is_some_and(|(_, p)| p < RULES.creeping_zero)
 }
 
-/// Subtracts from each record what its level of rest says about its own zero: of the deviation from the mean level the share
-/// that is not noise, as expected from both variances. Records that do not rest under a command of `off` stay as they are.
+/// Subtracts from each record its own offset, as estimated from its level of rest: the deviation from the mean
+/// level, multiplied by the share that is not noise according to both variances. Records that do not rest under a
+/// command of `off` stay unchanged.
 pub(super) fn tare(
     records: &mut [Record],
     beginnings: &[Beginning],
@@ -365,7 +368,7 @@ pub(super) fn tare(
     }
 }
 
-/// Moves y of a record, and what goes with it.
+/// Shifts y of a record, and the quantities that depend on its level.
 fn subtract(record: &mut Record, zero: f64) {
     let envelope = [&mut record.y_min, &mut record.y_max];
     let series = envelope.into_iter().flatten().chain([&mut record.y]);
@@ -378,7 +381,7 @@ fn subtract(record: &mut Record, zero: f64) {
 impl fmt::Display for MovingZero {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let ((low, lowest), (high, highest)) = (&self.lowest, &self.highest);
-        // As many digits as tell them apart.
+        // As many digits as are needed to distinguish the two levels.
         let apart = (highest - lowest).abs().max(f64::MIN_POSITIVE);
         let digits = 2
             + (lowest.abs().max(highest.abs()) / apart)
@@ -392,8 +395,9 @@ impl fmt::Display for MovingZero {
         };
         write!(
             f,
-            "Record-to-record offset: {where_read} `{low}` reads {lowest} and `{high}` {highest}. Every command subtracts each \
-             record's own offset; on the board, subtract the reading at rest before the law starts (`import` has `--y-offset`)."
+            "Record-to-record offset: {where_read} `{low}` reads {lowest} and `{high}` {highest}. Each \
+             record's own offset is subtracted; on the board, subtract the reading at rest before the law \
+             starts (`import` has `--y-offset`)."
         )
     }
 }
@@ -450,8 +454,8 @@ mod tests {
         assert!(moves(0.012) && !moves(0.02));
     }
 
-    /// Zeros of two days, less than a standard error of a sample apart: where the rests scatter within themselves by all of
-    /// the standard error, nothing of it is slow noise.
+    /// Offsets of two days that differ by less than a standard error of a sample. If the scatter within the rests
+    /// equals the standard error, no part of it is slow noise.
     #[test]
     fn a_zero_that_moves_by_less_than_the_noise_is_told_where_that_is_fast() {
         let share = |sd: f64| {
@@ -484,7 +488,7 @@ mod tests {
         };
         assert!(moves(&[0.0, 0.011, 0.019, 0.032, 0.04, 0.05, 0.06]));
         assert!(!moves(&[0.032, 0.0, 0.05, 0.019, 0.06, 0.04, 0.011]));
-        // Less than slow noise makes of two rests.
+        // Less than the difference of two rests that slow noise produces.
         assert!(!moves(&[0.0, 0.005, 0.01, 0.016, 0.02, 0.026, 0.03]));
     }
 
@@ -518,7 +522,7 @@ mod tests {
         let records = [("a", 0.0), ("b", 0.006), ("c", -0.005)].map(|(n, zero)| resting(n, zero));
         let moves = |left: f64| MovingZero::of(&records, &[short; 3], 0.0, || left).is_some();
         assert!(moves(0.006));
-        // As much slow noise as the zeros are apart.
+        // As much slow noise as the difference of the offsets.
         assert!(!moves(0.02));
     }
 
@@ -545,8 +549,8 @@ mod tests {
         assert_eq!(level_of_rest(&records[..1], &[blown], 0.0), None);
     }
 
-    /// Rests of a third of the time constant, then switched, with white noise of 0.01; y = zero + x, and for `bent` the
-    /// same with a time constant that is twice as long while the command is off.
+    /// Rests of a third of the time constant, then switching, with white noise of 0.01; y = zero + x. With `bent`,
+    /// the time constant is twice as long while the command is off.
     fn switched_early(name: &str, zero: f64, bent: bool, hold: usize) -> Record {
         let u: Vec<f64> = (0..900)
             .map(|k| f64::from(u8::from(k > 25 && (k / hold).is_multiple_of(2))))
@@ -585,7 +589,7 @@ mod tests {
         // Without them nothing moves.
         assert!(MovingZero::by_response(&tared).is_none());
         assert!(MovingZero::by_response(&records([0.3; 3], false)).is_none());
-        // What a response lacks may look like a zero.
+        // A misfit of the response may look like an offset.
         assert!(MovingZero::by_response(&records([0.0, 0.05, 0.02], true)).is_none());
     }
 }

@@ -3,70 +3,83 @@
 use crate::rules;
 
 rules! {
-    /// What is decided about records before any model: how they begin, where they rest, which samples are scored.
+    /// Properties of the records that are determined before any model: how they begin, where they rest, which
+    /// samples are scored.
     pub struct Rules in "preparation";
 
-    /// The first-order reference is fitted to so many samples at most: longer records are averaged over neighbours.
-    reference_samples: usize = 20_000, "samples", "judgement: for the time it takes";
+    /// Most samples to which the first-order reference is fitted; longer records are averaged over neighbours.
+    reference_samples: usize = 20_000, "samples", "judgement: limits the time";
     /// Its shortest time constant.
-    shortest_time: f64 = 0.5, "samples", "faster responses cannot be told from none";
+    shortest_time: f64 = 0.5, "samples", "faster responses are not distinguishable from an immediate one";
     /// Rounds in which its dead time and time constant are refined.
     refinements: usize = 7, "", "halving: to a hundredth of the first step";
-    /// Less than this explained by it, and y is taken not to follow u.
+    /// If the reference explains less than this share, y counts as independent of u.
     related: f64 = 0.2, "share of the variance", "judgement";
 
-    /// A record rests until its first edge and this much of the dead time longer; what answers sooner answers an edge before it.
-    surely_before: f64 = 0.6, "dead times", "delays that follow the state differ by less on the bundled flows";
-    /// A channel that keeps each value for so many samples on average is switched; a record rests until it is.
+    /// A record rests until its first edge plus this share of the dead time. An earlier response belongs to an edge
+    /// before the record.
+    surely_before: f64 = 0.6, "dead times", "state-dependent delays differ by less on the bundled flows";
+    /// A channel that keeps each value for at least this many samples on average counts as switched. A record rests
+    /// at most until the channel switches.
     switched: usize = 20, "samples", "judgement: measured quantities change at almost every sample";
-    /// So many time constants are enough to tell rest from motion.
-    times_of_rest: f64 = 3.0, "time constants", "5 % are left of a motion";
-    /// Fewer samples do not tell rest from motion.
+    /// A rest must last this many time constants to be distinguished from motion.
+    times_of_rest: f64 = 3.0, "time constants", "a motion has then decayed to 5 %";
+    /// A rest must have at least this many samples to be distinguished from motion.
     fewest_at_rest: usize = 5, "samples", "judgement";
-    /// y moves if its motion under a constant command is more than this part of what the reference response leaves, as an
-    /// unsteady flow moves by itself …
-    motion_unexplained: f64 = 0.5, "times its rms", "the flow simulation moves at rest";
-    /// … and more than so many times the variance that is left.
-    motion_over_noise: f64 = 40.0, "times", "judgement: noise with 10 samples of memory stays below";
-    /// Short rests under one command that are further apart than this are no rests.
-    rests_apart: f64 = 0.03, "share of the range of y", "judgement: more than noise makes of the mean of a few samples";
-    /// A record may begin with an edge of the command; its first so many dead times decide whether it does: …
-    early: f64 = 2.5, "dead times", "what comes later looks alike";
-    /// … it does if the response to such an edge leaves less than this share of the residual of a relaxation to rest.
-    answer: f64 = 0.95, "share of the sum of squares", "judgement: both have as many parameters, one of two is told its dead time";
-    /// In mid-run free runs follow the measurement for twice the dead time, and for no more than this part of a record …
-    most_followed: usize = 4, "th of a record", "judgement";
-    /// … and until what is slow has faded, if that is no more than this part.
-    followed_share: usize = 10, "th of a record", "a slow wake whose beginning nobody saw leaves 1.11 times the noise of a true model where only the dead time is followed";
+    /// y moves if its motion under a constant command exceeds this share of the residual of the reference response
+    /// (an unsteady flow moves by itself) …
+    motion_unexplained: f64 = 0.5, "times its rms", "the flow simulation moves under a constant command";
+    /// … and this many times the residual variance.
+    motion_over_noise: f64 = 40.0, "times", "judgement: noise with a memory of 10 samples stays below";
+    /// Short rests under one command do not count if their levels differ by more than this.
+    rests_apart: f64 = 0.03, "share of the range of y", "judgement: noise shifts the mean of a few samples by less";
+    /// A record may begin with an edge of the command. This is decided from its start, over this many dead times: …
+    early: f64 = 2.5, "dead times", "later parts of the two responses are alike";
+    /// … it begins with an edge if the response to it leaves less than this share of the residual of a relaxation
+    /// to rest.
+    answer: f64 = 0.95, "share of the sum of squares", "judgement: both have as many parameters, but the dead \
+         time of one of two is given";
+    /// In mid-run, free runs follow the measurement for twice the dead time, at most for this share of a record …
+    most_followed: usize = 4, "times shorter than the record", "judgement";
+    /// … and until slow components have decayed, if that takes at most this share.
+    followed_share: usize = 10, "times shorter than the record", "following the measurement for the dead time only leaves \
+         1.11 × the noise of a true model, if the initial state of a slow wake is unknown";
 
-    /// Graded commands whose largest is no less than this, up to 1, are shares of a full jet of 1.
-    share_of_full: f64 = 0.5, "u", "graded commands that draw levels seldom draw the full one; a supply in volts is seldom below 1";
-    /// Graded commands further from 0 than this have an operating point of their own.
+    /// If the largest graded command lies between this and 1, commands are fractions of a full jet of 1.
+    share_of_full: f64 = 0.5, "u", "graded commands with random levels rarely contain the full one; a supply \
+         in volts is rarely below 1";
+    /// Graded commands that are further from 0 than this have an operating point.
     operating_point: f64 = 0.25, "times their range", "judgement";
 
-    /// The level of rest is 0 unless its mean is off by so much.
+    /// The rest level is 0 unless its mean differs from 0 by at least this.
     off_zero: f64 = 5.0, "standard errors", "convention";
-    /// Noise that is slower than a rest is no more than the standard errors of y; where they are not stated, no more than what
-    /// the reference response leaves, and this.
-    slow_noise: f64 = 0.0075, "share of the range of y", "judgement: what slow noise makes of the mean of half a second stays below four times it";
-    /// The zero moves if records rest further apart than so much noise, and than chance, …
-    moving_zero_noise: f64 = 4.0, "noise rms", "in 30 sets slow noise reached 2.9";
-    /// … or if the F-test of their scatter against what noise makes of a rest gives this p-value; slow noise is what of the
-    /// variance the rests do not show within themselves, …
-    moving_zero_p: f64 = 0.01, "p-value", "convention; in 34 sets whose zero does not move p was spread evenly from 0.07 to 1";
-    /// … by more than so much.
+    /// Upper limit of noise that is slower than a rest: the standard errors of y. Where these are unknown, it is
+    /// the residual of the reference response, and at most this share of the range.
+    slow_noise: f64 = 0.0075, "share of the range of y", "judgement: slow noise shifts the mean of half a \
+         second by less than four times this";
+    /// The sensor's offset varies between records if their rest levels differ by more than this many noise
+    /// deviations and significantly, …
+    moving_zero_noise: f64 = 4.0, "noise rms", "slow noise reached 2.9 in 30 sets";
+    /// … or if the F-test of their scatter against the noise of a rest gives this p-value. Slow noise is the part
+    /// of the variance that is not visible within the rests, …
+    moving_zero_p: f64 = 0.01, "p-value", "convention; in 34 sets without an offset, p was spread evenly from 0.07 to 1";
+    /// … by more than this many standard errors.
     slower_by_chance: f64 = 2.0, "standard errors of that variance", "convention";
-    /// This share of either is enough where the rests follow the order of the records …
-    creeping_share: f64 = 0.5, "", "judgement: zeros that drifted began at 2.6 standard errors in 30 sets";
+    /// This share of either limit suffices if the rest levels follow the order of the records …
+    creeping_share: f64 = 0.5, "", "judgement: the smallest drift of an offset in 30 sets was 2.6 standard errors";
     /// … with this p-value.
-    creeping_zero: f64 = 0.005, "p-value", "all of 30 zeros that drifted in a straight line lay below 0.0013, eight of them less than four standard errors apart; all of 45 that did not lay above 0.0066";
-    /// Where no record rests, an estimated zero nearer to 0 than this is 0.
-    near_zero: f64 = 0.1, "size of the response", "judgement: a first-order response knows a bilinear flow's level to a tenth";
+    creeping_zero: f64 = 0.005, "p-value", "in all of 30 sets with a linear drift p was below 0.0013, in eight \
+         of them at less than four standard errors; in all of 45 sets without a drift p was above 0.0066";
+    /// If no record rests, an estimated offset closer to 0 than this is 0.
+    near_zero: f64 = 0.1, "size of the response", "judgement: a first-order response determines the level of a \
+         bilinear flow to a tenth";
 
-    /// Zeros of records and the response that they are read from are fitted in turn until the memory of its residual no
+    /// The records' offsets and the reference response are fitted alternately until the memory of the residual no
     /// longer falls to this share.
-    memory_falls: f64 = 0.9, "share of the samples before", "judgement: each round takes three quarters of the bias that is left";
-    /// Samples of that residual that are worth an independent one, above which a constant of a record may be physics that is
-    /// missing.
-    memoryless: f64 = 3.0, "samples", "judgement: noise of loggers; what a response lacks lasts as long as the response";
+    memory_falls: f64 = 0.9, "share of the samples before", "judgement: each round removes three quarters of \
+         the remaining bias";
+    /// Number of residual samples per independent sample. Above it a constant of a record may be a missing effect
+    /// instead of an offset.
+    memoryless: f64 = 3.0, "samples", "judgement: noise of loggers has a shorter memory; a misfit of the \
+         response lasts as long as the response";
 }

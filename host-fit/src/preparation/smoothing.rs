@@ -6,22 +6,22 @@ use std::ops::Range;
 /// Half-widths that are tried, samples.
 const HALVES: [usize; 6] = [2, 4, 8, 16, 32, 64];
 
-/// A parabola over so many samples on both sides, fitted by least squares.
+/// A parabola over this many samples on both sides, fitted by least squares.
 struct Parabola {
     value: f64,
-    /// Share of the sample's own value in it.
+    /// Weight of the sample's own value in it.
     leverage: f64,
 }
 
 impl Parabola {
-    /// At sample `at` of `y`, over the `2·half + 1` samples around it or, near the ends, next to it; none where there
-    /// are fewer.
+    /// At sample `at` of `y`, over the `2·half + 1` samples around it or, near the ends, next to it; `None` if
+    /// there are fewer samples.
     fn of(y: &[f64], at: usize, half: usize) -> Option<Self> {
         let width = 2 * half + 1;
         let from = at.saturating_sub(half).min(y.len().checked_sub(width)?);
         let window = y.get(from..from + width)?;
         let (n, center) = (width as f64, half as f64);
-        // Σx², Σx⁴ over −half … half: the parabola's second part is x² less its mean.
+        // Σx², Σx⁴ over −half … half: the parabola's second basis function is x² minus its mean.
         let squares = n * (n * n - 1.0) / 12.0;
         let mean = squares / n;
         let (mut sum, mut along, mut bend, mut bends) = (0.0, 0.0, 0.0, 0.0);
@@ -42,19 +42,19 @@ impl Parabola {
     }
 }
 
-/// y at sample `at`, smoothed over `half` samples on both sides; as it is for 0 or where there are too few samples.
+/// y at sample `at`, smoothed over `half` samples on both sides; unchanged for 0 or if there are too few samples.
 pub(super) fn smoothed(y: &[f64], at: usize, half: usize) -> f64 {
     let own = y.get(at).copied().unwrap_or(0.0);
     let parabola = (half > 0).then(|| Parabola::of(y, at, half)).flatten();
     parabola.map_or(own, |parabola| parabola.value)
 }
 
-/// What describes the slow part of a residual best.
+/// The best description of the slow part of a residual.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Slow {
     /// It is noise: 0.
     Nothing,
-    /// A parabola over so many samples on both sides; 0 is the residual itself.
+    /// A parabola over this many samples on both sides; 0 is the residual itself.
     Parabola(usize),
 }
 

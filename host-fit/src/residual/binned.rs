@@ -7,9 +7,9 @@ use crate::data::Record;
 /// Folds of the cross-validation of a coordinate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Folds {
-    /// Half-second blocks in turn, for coordinates that repeat within a record.
+    /// Blocks of half a second in turn, for coordinates that repeat within a record.
     Blocks,
-    /// Whole records, for time: an event in one record only is not a function of time.
+    /// Whole records, for time: an event in a single record does not count as a function of time.
     Records,
 }
 
@@ -278,7 +278,7 @@ fn binned(
     if high - low <= 1e-12 * high.abs().max(low.abs()) {
         return None;
     }
-    // Bin limits are rounded for readable sentences and axes.
+    // Bin limits are rounded, for readable sentences and axes.
     let step = 10f64.powf(((high - low) / 500.0).log10().floor());
     let tidy = |value: f64| (value / step).round() * step;
     let mut limits: Vec<f64> = (1..RULES.bins)

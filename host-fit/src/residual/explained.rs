@@ -238,8 +238,9 @@ fn gains(
     })
 }
 
-/// The sum over independent blocks; 0 if not significant: less than so many standard errors of a normal law above 0, or
-/// than the same quantile of Student's, since few blocks give their own variance badly.
+/// The sum over independent blocks; 0 if it is not significant. It must exceed a quantile of the normal
+/// distribution and the same quantile of Student's t, because few blocks give an inaccurate estimate of their own
+/// variance.
 pub(super) fn beyond_chance(gains: &[f64], standard_errors: f64) -> f64 {
     let n = gains.len() as f64;
     let free = (n - 1.0).max(1.0);
@@ -314,7 +315,8 @@ impl Learned {
 mod tests {
     use super::*;
 
-    /// 2.7 standard errors of the sum: more than 2.5 of a normal law, less than Student's quantile of ten blocks, 3.1.
+    /// 2.7 standard errors of the sum: more than the 2.5 of the normal distribution, less than Student's quantile
+    /// for ten blocks, 3.1.
     #[test]
     fn few_blocks_have_to_say_more() {
         let gains = |n: usize| -> Vec<f64> {

@@ -218,14 +218,14 @@ fn is_above(errors: &Errors) -> bool {
             .sum::<f64>();
     }
     let excess: f64 = blocks.iter().sum();
-    // A single large event has no reproducible mean, but noise alone does not reach it: Σ e² of as many
+    // A single large event has no reproducible mean. It is still distinguished from noise: Σ e² of as many
     // independent samples as blocks has the relative standard deviation √(2/n).
     let varies = (2.0 / blocks.len().max(1) as f64).sqrt();
     let steady = beyond_chance(&blocks, RULES.excess_standard_errors) > RULES.least_excess * noise;
     steady || excess > (RULES.least_excess + RULES.event_deviations * varies) * noise
 }
 
-/// The cycle that explains most; its multiples explain as much and are not preferred.
+/// The cycle that explains most; its multiples explain equally much and are not preferred.
 fn shortest_cycle(cycles: Vec<Where>) -> Option<Where> {
     cycles.into_iter().reduce(|best, next| {
         if next.explained_fraction > RULES.longer_cycle * best.explained_fraction {

@@ -53,7 +53,7 @@ fn by_repeats(record: &Record) -> Option<f64> {
         let shift = periods * period;
         let (mut same, mut pairs, mut sum) = (0, 0.0, 0.0);
         for k in shift..record.len() {
-            // Number of samples for which the command has equalled itself `shift` samples earlier.
+            // Number of samples for which the command has been equal to itself `shift` samples earlier.
             same = if record.u[k] == record.u[k - shift] {
                 same + 1
             } else {

@@ -45,7 +45,7 @@ pub(crate) fn split(effects: &[&str], faults: &[&str], seed: u64) -> Failures {
     where_it_fails(&base(&records), &records).expect("a stable model")
 }
 
-/// Three faults outside the catalogue for which the correct coordinate has the largest share.
+/// Three faults outside the catalogue for which the correct coordinate must have the largest share.
 #[test]
 fn faults_are_pointed_at() {
     for seed in 100..103 {
@@ -124,7 +124,7 @@ fn pure_noise_explains_nothing() {
 
 /// The leading coordinates of each hidden effect, on which the rules of this module were calibrated.
 #[test]
-#[ignore = "a table for people: cargo test --release -p host-fit table_of_plants -- --ignored --nocapture"]
+#[ignore = "prints a table: cargo test --release -p host-fit table_of_plants -- --ignored --nocapture"]
 fn table_of_plants() {
     use firmware_sim::plant::{Effect, Fault};
     let faults = Fault::NAMES.iter().map(|name| (*name, vec![], vec![*name]));

@@ -38,7 +38,7 @@ rules! {
     bins: usize = 30, "", "judgement: 300 samples a bin in a record of 10 s";
     /// Windows of past blowing: time scales of the flow, of a plenum, of a wall.
     windows_s: [f64; 3] = [0.25, 1.0, 4.0], "s", "judgement: the order of the time constants of a flow, a plenum and a wall";
-    /// A window at least this long changes more slowly than y, so that a gain may depend on it.
+    /// A window at least this long changes more slowly than y, so the gain may depend on it.
     slow_window_s: f64 = 1.0, "s", "judgement: four windows of ỹ";
     /// Longest cycle of pulses that is tried.
     longest_cycle: usize = 8, "pulses", "judgement; the missing-pulse plants drop one in 3 to 5";
@@ -54,7 +54,7 @@ rules! {
     worst_neighbour: f64 = 0.5, "share of the worst", "convention: width at half height";
     /// A longer cycle of pulses must explain this much more than a shorter one, because multiples explain as
     /// much.
-    longer_cycle: f64 = 1.05, "times", "the missing-pulse plants of `faults_are_pointed_at`";
+    longer_cycle: f64 = 1.05, "times", "tuned on the plants with missing pulses in the test `faults_are_pointed_at`";
     /// Pulse number is correlated with time: it must explain this much more than time to be preferred.
     pulses_are_a_clock: f64 = 1.3, "times", "the plants of `table_of_plants`";
 
@@ -62,7 +62,7 @@ rules! {
     piece_s: f64 = 1.024, "s", "a power of two at 1 kHz";
     /// Fewest segments of a spectrum.
     fewest_pieces: usize = 6, "", "three for training and three for testing";
-    /// A band's excess over the noise must be this many standard errors above 0.
+    /// A band's spectrum must exceed that of the noise by this many standard errors.
     band_standard_errors: f64 = 3.0, "standard errors", "convention; tested in `pure_noise_explains_nothing`";
 
     /// Level of the test for a trend from edge to edge.
@@ -78,7 +78,7 @@ rules! {
     periods_back: usize = 8, "periods", "the longest cycle of pulses";
     /// Fewest pairs of repeats for an estimate of the noise.
     fewest_histories: f64 = 2.0, "histories", "judgement; tested in `repeats_give_the_noise_even_when_every_third_pulse_is_missing`";
-    /// A command is periodic if it has at least so many periods.
+    /// A command is periodic if it has at least this many periods.
     fewest_periods: usize = 4, "periods", "judgement";
     /// A command is periodic if at least this share of its periods are equal, within a sample.
     alike_periods: f64 = 0.75, "share of the periods", "judgement";
@@ -88,9 +88,10 @@ rules! {
     /// Most coordinates that are mentioned.
     most_said: usize = 3, "", "judgement";
     /// A mean error is reported if it is at least this share of the rms error.
-    worth_saying_bias: f64 = 0.3, "share of the rms error", "judgement: 9 % of the energy";
+    worth_saying_bias: f64 = 0.3, "share of the rms error", "judgement: 9 % of the error energy";
     /// A mean error in the worst interval is reported if it is at least this share of the error there.
-    worth_saying_worst_bias: f64 = 0.5, "share of the rms error", "judgement: a quarter of the energy there";
+    worth_saying_worst_bias: f64 = 0.5, "share of the rms error", "judgement: a quarter of the error energy in \
+         the interval";
     /// An interval is reported if it contains this many times its share of the samples.
     worth_saying_interval: f64 = 1.3, "times", "judgement";
 }

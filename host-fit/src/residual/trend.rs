@@ -64,7 +64,8 @@ fn edges(u: &[f64]) -> Vec<(usize, bool)> {
         .collect()
 }
 
-/// Pearson's correlation and its two-sided p-value; none of fewer than three points, or where one of the two does not vary.
+/// Pearson's correlation and its two-sided p-value; `None` for fewer than three points, or if one of the two is
+/// constant.
 pub(crate) fn correlation(x: &[f64], y: &[f64]) -> Option<(f64, f64)> {
     let n = x.len() as f64;
     if x.len() < 3 {

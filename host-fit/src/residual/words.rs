@@ -84,23 +84,23 @@ fn sentence(found: &Where) -> String {
             "shrinks"
         };
         let dwell = if trend.rest {
-            "the rest before them"
+            "the preceding rest"
         } else {
-            "the length of the pulse before them"
+            "the length of the preceding pulse"
         };
         text.push_str(&format!(" and {verb} with {dwell}"));
     }
     if found.bias.abs() > RULES.worth_saying_worst_bias * found.worst_rmse {
         let direction = if found.bias > 0.0 { "low" } else { "high" };
         text.push_str(&format!(
-            "; at its largest the model is {} too {direction}",
+            "; where it is largest, the model is {} too {direction}",
             number(found.bias.abs())
         ));
     }
     let how = match found.dependence {
         Some(Dependence::Proportion) => ", in proportion to y",
-        Some(Dependence::Size) => ", by its size, not its sign",
-        Some(Dependence::Dwell) => ", together with the dwell before the edge",
+        Some(Dependence::Size) => ", in its magnitude, not its sign",
+        Some(Dependence::Dwell) => ", together with the length of the preceding rest or pulse",
         Some(Dependence::Mean) | None => "",
     };
     format!("{text}. The {coordinate} explains {explained} of the model error{how}.")

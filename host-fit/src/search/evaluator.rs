@@ -31,7 +31,7 @@ pub struct Snapshot {
 pub trait Progress: Sync {
     /// Called after each block of evaluations and each improvement, on the searching thread.
     fn report(&self, snapshot: &Snapshot);
-    /// The best point so far, after each report of one.
+    /// The best point so far, after each improvement.
     fn best(&self, _point: &Point) {}
 }
 
@@ -123,12 +123,12 @@ impl<'a, P: Problem> Evaluator<'a, P> {
         &self.history
     }
 
-    /// The flag that asks the search to stop; long steps should look at it.
+    /// The flag that requests the search to stop; long steps should check it.
     pub fn interrupt(&self) -> &'a AtomicBool {
         self.interrupt
     }
 
-    /// Whether the search was asked to stop.
+    /// Whether the search was requested to stop.
     pub fn is_interrupted(&self) -> bool {
         self.interrupt.load(Ordering::Relaxed)
     }

@@ -24,7 +24,7 @@ pub struct SearchReport {
     pub evaluations: usize,
     /// Points answered from the cache.
     pub cache_hits: usize,
-    /// Points that search steps judged in closed form.
+    /// Points that search steps evaluated in closed form.
     pub screened: usize,
     /// Every improvement: number of evaluations and value.
     pub history: Vec<(usize, f64)>,

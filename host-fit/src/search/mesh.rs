@@ -105,7 +105,7 @@ impl Mesh {
         self.axes.iter().map(MeshAxis::mesh_size).collect()
     }
 
-    /// Whether every frame has shrunk to one tick, so that no refinement is left.
+    /// Whether every frame has shrunk to one tick, so that no further refinement is possible.
     pub fn is_finest(&self) -> bool {
         self.axes.iter().all(|a| a.frame_size() == 1)
     }

@@ -13,9 +13,8 @@ pub enum Evaluation {
 
 /// A function of integers and granular reals to be minimised.
 ///
-/// [`evaluate`](Self::evaluate) must depend on nothing but the point and what
-/// [`prepare`](Self::prepare) did, and be callable from several threads: that is
-/// what makes a search repeatable whatever the number of threads.
+/// [`evaluate`](Self::evaluate) must depend only on the point and on [`prepare`](Self::prepare), and be callable
+/// from several threads. Then a search is repeatable whatever the number of threads.
 pub trait Problem: Sync {
     /// The variables, in the order of a point's coordinates.
     fn variables(&self) -> &[Variable];
@@ -26,8 +25,8 @@ pub trait Problem: Sync {
         point.to_vec()
     }
 
-    /// Sets of coordinates that are polled separately, because moving them
-    /// together is rarely useful or much dearer. Default: all in one.
+    /// Sets of coordinates that are polled separately, because moving them together is rarely useful or much more
+    /// expensive. Default: all in one.
     fn groups(&self) -> Vec<Vec<usize>> {
         vec![(0..self.variables().len()).collect()]
     }

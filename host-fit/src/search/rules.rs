@@ -14,7 +14,7 @@ rules! {
     anisotropy: f64 = 0.1, "share of the frame", "NOMAD's default";
     /// After a success the same step is tried with this multiple of its length.
     speculative: f64 = 4.0, "times", "NOMAD's default";
-    /// Smallest kick out of a local optimum; unsuccessful kicks grow.
+    /// Smallest kick (random perturbation) out of a local optimum; kicks grow while they are unsuccessful.
     least_kick: f64 = 0.02, "share of each variable's range", "judgement";
     /// Largest kick out of a local optimum.
     largest_kick: f64 = 0.3, "share of each variable's range", "judgement";

@@ -9,7 +9,7 @@ pub struct Settings {
     pub evaluations: usize,
     /// Seed of every random choice: the same seed gives the same result bit for bit.
     pub seed: u64,
-    /// Threads that evaluate, at least 1. The result does not depend on it.
+    /// Threads that evaluate, at least 1. They do not change the result.
     pub threads: usize,
     /// Poll directions.
     pub poll: PollKind,

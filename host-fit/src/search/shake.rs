@@ -43,7 +43,7 @@ impl<P: Problem> SearchStep<P> for Shake {
         }
         self.fruitless += 1;
         let variables = evaluator.problem().variables().to_vec();
-        // The kick grows over the allowed attempts and moves a random subset of the variables.
+        // The size of the perturbation grows over the allowed attempts; it moves a random subset of the variables.
         let growth = RULES.largest_kick - RULES.least_kick;
         let share = RULES.least_kick + growth * self.fruitless as f64 / self.patience as f64;
         let moving: f64 = around.rng.random_range(0.2..1.0);

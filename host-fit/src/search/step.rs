@@ -32,7 +32,7 @@ pub trait SearchStep<P: Problem> {
     /// Looks for a point better than the incumbent.
     ///
     /// # Errors
-    /// The reason to stop the whole search, handed on from the evaluator.
+    /// The reason to stop the whole search, passed on from the evaluator.
     fn search(
         &mut self,
         evaluator: &mut Evaluator<'_, P>,

@@ -25,7 +25,7 @@ impl StopReason {
         matches!(self, Self::LocallyOptimal | Self::NothingToSearch)
     }
 
-    /// Whether the call, not the data, is the cause.
+    /// Whether the call is the cause, not the data.
     pub fn was_usage_issue(self) -> bool {
         matches!(self, Self::NothingToSearch)
     }
@@ -51,7 +51,7 @@ impl fmt::Display for StopReason {
             Self::EvaluationBudget => {
                 "stopped at the evaluation limit: the result may improve with more evaluations"
             }
-            Self::Interrupted => "interrupted: this is the best result found until then",
+            Self::Interrupted => "interrupted: this is the best result so far",
             Self::NoFiniteValue => {
                 "no point tried gave a finite value: every candidate model diverged or could not be fitted"
             }

@@ -21,7 +21,7 @@ pub enum Tone {
 }
 
 /// A result in four parts that are read at once. The terminal, the report page, the workbench and the JSON document
-/// all print this value: it is worded in one place.
+/// all print this value, so its words are written in one place.
 ///
 /// ```
 /// use host_fit::steps::{Answer, Tone};
@@ -39,7 +39,7 @@ pub struct Answer {
     pub tone: Tone,
     /// The result in three to eight words, without a full stop.
     pub verdict: String,
-    /// One number and what it is compared with.
+    /// One number with the number to which it is compared.
     pub evidence: String,
     /// The confidence with its test; empty if nothing was tested.
     pub confidence: String,
@@ -101,7 +101,7 @@ impl Answer {
         self
     }
 
-    /// The labelled parts that are not empty, the verdict aside.
+    /// The labelled parts that are not empty, without the verdict.
     #[must_use]
     pub fn parts(&self) -> Vec<(&'static str, &str)> {
         let all = [

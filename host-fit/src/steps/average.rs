@@ -19,8 +19,8 @@ pub struct Average {
     pub recordings: Vec<AverageSummary>,
 }
 
-/// Phase-averages raw recordings in constant memory; those named in `validate` (file name without its ending) are held
-/// out. `progress` hears the index of the file being read and the bytes read of it.
+/// Phase-averages raw recordings in constant memory; those named in `validate` (file name without its ending)
+/// become validation records. `progress` receives the index of the file being read and the bytes read of it.
 ///
 /// ```no_run
 /// use host_fit::data::Averaging;

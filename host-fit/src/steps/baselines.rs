@@ -8,10 +8,10 @@ use serde::Serialize;
 /// Baselines with the scored samples.
 #[derive(Clone, Debug, Serialize)]
 pub struct Beside {
-    /// FIT of each, %: on the validation records, or on the estimation records where there are none.
+    /// FIT of each, %: on the validation records, or on the estimation records if there are none.
     #[serde(rename = "baselines")]
     pub fits: BaselineFits,
-    /// Samples that are scored, of all records.
+    /// Number of scored samples in all records.
     pub scored_samples: usize,
     /// Samples of all records.
     #[serde(skip)]
@@ -22,7 +22,7 @@ pub struct Beside {
 }
 
 impl Beside {
-    /// Fits the baselines to the estimation records among prepared `records`, and scores them as models are scored.
+    /// Fits the baselines to the estimation records among prepared `records`, and scores them like models.
     pub(super) fn of(records: &[Record]) -> Self {
         let of = |role: Use| -> Vec<&Record> {
             let own = records.iter().filter(|record| record.role == role);

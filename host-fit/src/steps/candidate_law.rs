@@ -10,8 +10,8 @@ use crate::model::{Delay, Model};
 use model_core::average::WINDOW;
 use model_core::effects::StateDependentDelay;
 
-/// Law (2) from the edges; if they do not support one, from a free-run fit with the lowest-order model.
-/// `None` if it is negative on the records. The caller tests it against a constant delay.
+/// Law (2) from the edges; if they do not support one, from a free-run fit with the lowest-order model. `None` if
+/// it is negative on the records. The caller tests it against a constant delay.
 pub(super) fn candidate_law(
     set: &DataSet,
     learning: &[&Record],
@@ -36,7 +36,8 @@ pub(super) fn candidate_law(
     let law = ExponentialDelay { floor, rise, rate };
     let reason = study.law_not_kept.as_deref();
     let reason = reason.unwrap_or("no edge was measured");
-    let origin = format!("fitted in free run; the edges alone do not support it ({reason})");
+    let origin =
+        format!("fitted in free run, because the edges alone do not support it ({reason})");
     Ok(is_positive(law, learning).then_some((law, origin)))
 }
 

@@ -35,8 +35,8 @@ pub struct Design {
     pub sample_period_s: f64,
     /// The law.
     pub law: Law,
-    /// Sensor offset: the reading without friction, y. Levels here and in trials include it, those of the law
-    /// do not.
+    /// Sensor offset: the reading without friction, y. Levels here and in trials include it; those of the law do
+    /// not.
     pub sensor_zero: f64,
     /// Figures of the design.
     #[serde(flatten)]
@@ -239,7 +239,7 @@ pub fn design(model: &Model, request: &DesignRequest) -> Result<Design, StepErro
     })
 }
 
-/// The plants beside `model` that `set` does not exclude, on which a law must keep attachment.
+/// The plants that `set` does not exclude, in addition to `model`; a law must keep attachment on them.
 ///
 /// # Errors
 /// [`StepError`]: other sampling period, a missing channel, a model whose free run diverges.

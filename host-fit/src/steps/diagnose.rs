@@ -169,7 +169,7 @@ pub fn diagnose(
         };
         let beyond = match diagnosis.verdict {
             Verdict::PartlyExplained | Verdict::Unexplained => {
-                progress("a first look beyond the catalogue");
+                progress("a first estimate beyond the catalogue");
                 glance(&diagnosis.model, &records, onlooker.interrupt())
             }
             Verdict::NothingMissing | Verdict::EffectMissing => None,
@@ -255,8 +255,8 @@ fn as_written(diagnosis: &mut Diagnosis, given: &Model, records: &[Record]) -> O
     judged.filter(|_| !whole)
 }
 
-/// The measured channel that the error of the final model depends on, and the explained share; none if there
-/// is none, or if an effect of the model uses it already.
+/// The measured channel that the error of the final model depends on, with the explained share. `None` if there is
+/// none, or if an effect of the model already uses it.
 fn followed_channel(diagnosis: &Diagnosis, failures: Option<&Failures>) -> Option<(String, f64)> {
     let failures = failures.filter(|failures| failures.above_noise)?;
     let known = diagnosis.model.channels();

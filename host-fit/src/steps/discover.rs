@@ -70,7 +70,7 @@ impl Serialize for Terms {
     }
 }
 
-/// Finds the terms that `model` lacks on `set`, whether a catalogue has them or not.
+/// Finds the terms that `model` lacks on `set`, whether they are in a catalogue or not.
 ///
 /// ```no_run
 /// use host_fit::data::DataSet;
@@ -87,7 +87,7 @@ impl Serialize for Terms {
 /// ```
 ///
 /// # Errors
-/// [`StepError`]: different sampling periods, nothing to learn from, a user who ended it at once.
+/// [`StepError`]: different sampling periods, no estimation record, an interrupt before the first result.
 pub fn discover(
     model: &Model,
     set: &DataSet,
@@ -130,8 +130,8 @@ pub fn discover(
     })
 }
 
-/// The final model by its free-run error over whole `records`: the found one, or the given one if its error
-/// is smaller. Every step of the ladder is of whole records.
+/// The final model by its free-run error over whole `records`: the found one, or the given one if its error is
+/// smaller. Every step of the ladder refers to whole records.
 fn as_written(
     discovery: &mut Discovery,
     given: &Model,
@@ -195,7 +195,8 @@ fn answer(discovery: &Discovery) -> Answer {
             });
         for (place, smallest) in &discovery.smallest_seen {
             answer.note(format!(
-                "At the {place}, a term of {} to {} (rms) would have been found; the value depends on its coordinate.",
+                "At the {place}, a term with an rms value of {} to {}, depending on its coordinate, would have \
+                     been detected.",
                 spoken(smallest.from, smallest.unit),
                 spoken(smallest.to, smallest.unit)
             ));
@@ -312,11 +313,11 @@ fn where_it_enters(trace: &Trace) -> String {
     let odds = odds.collect::<Vec<_>>().join(", ");
     match trace.place {
         Some(place) => format!(
-            "The error enters at the {} whatever it depends on (posterior: {odds}).",
+            "The error enters at the {}, for any coordinate (posterior: {odds}).",
             place.word()
         ),
         None => format!(
-            "These records do not show at which place the error enters (posterior: {odds})."
+            "These records do not identify the place at which the error enters (posterior: {odds})."
         ),
     }
 }

@@ -74,8 +74,8 @@ pub enum StepError {
     Codegen(#[from] CodegenError),
     /// A model and recordings of different sampling periods.
     #[error(
-        "{place}: `sample_period_s` is {data}, but the model was made for {model} s, and its lags are \
-        counted in samples. Identify a model on this data, or resample it"
+        "{place}: `sample_period_s` is {data}, but the model has {model} s, and its lags are counted in \
+        samples. Identify a model on this data, or resample it"
     )]
     SamplePeriod {
         /// The recordings.
@@ -117,7 +117,7 @@ pub enum StepError {
     /// An effect does not lower the error.
     #[error(
         "nothing was written: with {effects} the error of the free run does not decrease ({before} → {after} \
-        on the {on} records). Use the model as it was, or another effect (`host-fit diagnose` ranks them)"
+        on the {on} records). Keep the given model, or try another effect (`host-fit diagnose` ranks them)"
     )]
     NoGain {
         /// The effects.
@@ -131,9 +131,9 @@ pub enum StepError {
     },
     /// Too few samples can be scored.
     #[error(
-        "{scored} of {samples} samples can be scored, less than half: the others are lead-in (`lead_samples` \
-        in dataset.toml) or belong to records that start in mid-run. Record longer, or state what the command was before \
-         the first sample (`u_before` in dataset.toml)"
+        "{scored} of {samples} samples can be scored, less than half. The others are lead-in (`lead_samples` \
+        in dataset.toml) or belong to records that start in mid-run. Record longer, or state the command \
+        before the first sample (`u_before` in dataset.toml)"
     )]
     TooFewScored {
         /// Samples that can be scored.
@@ -142,7 +142,7 @@ pub enum StepError {
         samples: usize,
     },
     /// A channel that the model's effects need.
-    #[error("{place}: no column `{channel}`, which the model's effects need; add it")]
+    #[error("{place}: the column `{channel}`, which the model's effects need, is missing; add it")]
     NoChannel {
         /// The command file.
         place: Box<FilePlace>,

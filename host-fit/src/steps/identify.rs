@@ -33,11 +33,11 @@ pub struct IdentifyRequest {
     pub delay: Option<DelayKind>,
     /// Keep unrounded delays even if the validation error hardly differs.
     pub interpolated: bool,
-    /// Factors f of the delay law, one per input, in place of searching them; empty to search.
+    /// Factors f of the delay law, one per input, instead of a search for them; empty to search.
     pub factors: Vec<f64>,
     /// Identify the model of the moving averages, eqs. (14) and (15).
     pub averaged: bool,
-    /// Number of state lags N1. Where no count is given and the objective is the free run, the structure is chosen by
+    /// Number of state lags N1. If no number is given and the objective is the free run, the structure is chosen by
     /// validation error; otherwise 5, for the averaged model 2.
     pub n1: Option<u16>,
     /// Number of product lags N2; by default 10, for the averaged model 2.
@@ -52,11 +52,11 @@ pub struct IdentifyRequest {
     pub objective: Objective,
     /// Most evaluations of the objective.
     pub evaluations: usize,
-    /// Threads; the result does not depend on it.
+    /// Number of threads; the result does not depend on it.
     pub threads: usize,
     /// Seed of every random choice.
     pub seed: u64,
-    /// Physical effects to add once the base model is there.
+    /// Physical effects to add to the base model.
     pub effects: Vec<String>,
     /// The user's own effects.
     pub definitions: Vec<&'static Definition>,
@@ -128,7 +128,7 @@ pub struct Identification {
     /// Why the search ended.
     #[serde(serialize_with = "stop_name")]
     pub stop: StopReason,
-    /// The refinement on the free run, where one was made.
+    /// The refinement on the free run, if one was made.
     pub refinement: Option<Refinement>,
     /// Largest pole magnitudes of the recursion, closed and open.
     pub poles: [f64; 2],
@@ -314,8 +314,9 @@ fn overfitted(scores: &Scores, model: &Model) -> Option<String> {
     })
 }
 
-/// Identifies a model on the identify records of `set`: the delays by search, the coefficients by least squares inside
-/// it, refined on the free run where that is the objective and the validation error falls.
+/// Identifies a model on the identify records of `set`. The delays are found by search, and the coefficients by
+/// least squares within it. If the objective is the free run, the coefficients are refined on it, and kept if the
+/// validation error falls.
 ///
 /// ```
 /// use host_fit::data::DataSet;
@@ -338,7 +339,7 @@ fn overfitted(scores: &Scores, model: &Model) -> Option<String> {
 /// ```
 ///
 /// # Errors
-/// [`StepError`]: data that cannot bear a fit (naming the file), a request that contradicts itself, no stable model.
+/// [`StepError`]: data that do not permit a fit (naming the file), a contradictory request, no stable model.
 pub fn identify(
     set: &DataSet,
     request: &IdentifyRequest,
@@ -359,7 +360,7 @@ pub fn identify(
     if request.is_automatic() {
         return automatic(set, &prepared, request, onlooker, (remarks, excitation));
     }
-    // The recursion has its zero at the rest level of the records, and jets between 0 and 1.
+    // In the recursion the rest level of the records is 0, and jets are between 0 and 1.
     let units = Units {
         zero: prepared.zero,
         command: prepared.command,
@@ -535,7 +536,7 @@ fn automatic(
     if let Some((baseline, better)) = better_baseline(&model, &scores, &beside, &records) {
         (model, scores) = (baseline, better);
         remarks.push(
-            "The model that is written is that baseline: no bilinear structure has a lower validation error."
+            "The written model is that baseline: no bilinear structure has a lower validation error."
                 .to_owned(),
         );
     }

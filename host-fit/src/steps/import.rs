@@ -1,4 +1,4 @@
-//! Files of other programs to a data set.
+//! Conversion of files of other programs to a data set.
 
 use std::path::{Path, PathBuf};
 
@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::StepError;
 use crate::data::import::{self, Import, Imported, ImportedFile};
 
-/// What an import gave. Serialises to the keys of `import --json`.
+/// Result of an import. Serialises to the keys of `import --json`.
 #[derive(Clone, Debug, Serialize)]
 pub struct ImportedSet {
     /// The data set with its mapping, to be saved.
@@ -19,11 +19,12 @@ pub struct ImportedSet {
     pub sample_period_s: f64,
     /// What became of each file.
     pub files: Vec<ImportedFile>,
-    /// What should be known of the data set as a whole: periods that were made one, that nothing is held out.
+    /// Remarks on the data set as a whole: periods that were unified, no validation record.
     pub remarks: Vec<String>,
 }
 
-/// Makes a data set of CSV files of any dialect, MATLAB's `.mat`, NumPy's `.npy` and `.npz`, or of a folder of them.
+/// Makes a data set of CSV files of any dialect, MATLAB's `.mat`, NumPy's `.npy` and `.npz`, or of a folder of
+/// them.
 ///
 /// ```
 /// use host_fit::data::import::{Import, Mapping};

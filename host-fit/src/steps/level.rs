@@ -9,7 +9,7 @@ use crate::order;
 use crate::picture::significant;
 use crate::residual::Failures;
 
-/// "2.64 × the noise level (RMSE 0.0273, FIT 92.7 %)"; without the ratio where there is no `y_sd`.
+/// "2.64 × the noise level (RMSE 0.0273, FIT 92.7 %)"; without the ratio if there is no `y_sd`.
 pub(super) fn beside_noise(all: &Indicators) -> String {
     let noise = all.noise_rmse.filter(|noise| *noise > 0.0);
     let rmse = significant(all.rmse, 3);
@@ -23,7 +23,7 @@ pub(super) fn beside_noise(all: &Indicators) -> String {
     }
 }
 
-/// "validation error", or "estimation error" where no record is marked `validate`.
+/// "validation error", or "estimation error" if no record is marked `validate`.
 pub(super) fn error_name(role: Use) -> &'static str {
     match role {
         Use::Validate => "validation error",

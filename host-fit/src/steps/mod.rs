@@ -19,9 +19,8 @@
 //!
 //! [`catalogue`] lists the effects, [`rulebooks`] every threshold.
 //!
-//! Every result serialises to the JSON document of the step, without paths of written files and without data
-//! that only pictures need. The program consists of these functions, a parser in front and three renderers
-//! (text, JSON, pages) behind them.
+//! Every result serialises to the JSON document of the step, without paths of written files and without data that
+//! only pictures need. The program consists of these functions, a parser, and three renderers (text, JSON, pages).
 
 mod answer;
 mod average;

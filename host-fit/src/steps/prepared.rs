@@ -1,14 +1,14 @@
-//! The records of a data set as every step runs and judges models on them.
+//! The records of a data set on which every step runs and validates models.
 
 use super::StepError;
 use crate::data::DataSet;
 use crate::preparation::{Preparation, scored_samples};
 
-/// The records of `set`, made ready from the data alone: the same beginnings and the same scored samples for every
+/// The records of `set`, prepared from the data alone: the same beginnings and the same scored samples for every
 /// model of a command.
 ///
 /// # Errors
-/// [`StepError::TooFewScored`] where less than half of the samples outside stated leads would be scored.
+/// [`StepError::TooFewScored`] if less than half of the samples outside stated leads would be scored.
 pub(super) fn prepared(set: &DataSet) -> Result<Preparation, StepError> {
     let prepared = Preparation::of(&set.records);
     let (scored, _) = scored_samples(&prepared.records);

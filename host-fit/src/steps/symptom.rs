@@ -118,7 +118,7 @@ const CHECKS: [(&str, &str); 21] = [
     ),
     (
         "echo-path",
-        "move the sensor or block one jet: the second arrival moves or disappears",
+        "move the sensor or block one jet: the second response moves or disappears",
     ),
     (
         "starting-vortex",
@@ -134,7 +134,7 @@ const CHECKS: [(&str, &str); 21] = [
     ),
     (
         "edge-dependent-delay",
-        "measure the jet velocity with the tunnel off: the two edges differ there too",
+        "measure the jet velocity with the tunnel off: its rise and fall have different delays too",
     ),
     (
         "attachment-hysteresis",
@@ -150,7 +150,7 @@ const CHECKS: [(&str, &str); 21] = [
     ),
     (
         "dry-friction",
-        "give the smallest command that moves y and look for a dead zone",
+        "increase the command slowly from 0 and look for a dead zone",
     ),
     (
         "quadratic-drag",
@@ -162,7 +162,7 @@ const CHECKS: [(&str, &str); 21] = [
     ),
     (
         "rectifying-sensor",
-        "turn the sensor by 180 degrees: a sign-blind one reads the same",
+        "turn the sensor by 180 degrees: a sensor that does not measure the sign reads the same",
     ),
     (
         "hot-film-nonlinearity",
@@ -170,7 +170,7 @@ const CHECKS: [(&str, &str); 21] = [
     ),
     (
         "hot-film-lag",
-        "give the sensor alone a step of its heating current, or open a shutter",
+        "apply a step to the sensor alone, by its heating current or a shutter",
     ),
     (
         "thermal-drift",
@@ -234,7 +234,8 @@ const CONFUSED: [(&str, &str); 12] = [
     ),
     (
         "thermal-drift",
-        "a record-to-record offset and `plenum-droop`: repeat one record after an hour of warming up.",
+        "a record-to-record offset and `plenum-droop`: one record repeated after an hour of warming up \
+             distinguishes them.",
     ),
 ];
 

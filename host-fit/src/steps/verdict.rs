@@ -11,14 +11,15 @@ use crate::terms::second_lag_s;
 use model_core::effect::Place;
 use model_core::effects::spec;
 
-/// What a p-value and an interval are worth, measured on simulated plants (docs/evidence.md).
-const CALIBRATED: &str = "What p and intervals are worth, measured on simulated plants: of 40 without a missing effect, one got a false name; \
-     95 % intervals held the truth in about 90 % of the cases.";
+/// The reliability of p-values and intervals, measured on simulated plants (docs/evidence.md).
+const CALIBRATED: &str = "Reliability of p-values and intervals, measured on simulated plants: of 40 without a \
+     missing effect, one got a false name; 95 % intervals contained the true value in about 90 % of the cases.";
 
-/// Smaller p-values are shown as this: their size is that of the noise model, which is not known so well.
+/// Smaller p-values are printed as this, because their size depends on the noise model, which is not known
+/// accurately.
 const LEAST_P: f64 = 1e-6;
 
-/// A p-value that is known as a bound, with its sign of comparison.
+/// A p-value that is an upper bound, with its sign of comparison.
 #[must_use]
 pub fn p_bound(p: f64) -> String {
     match p {
@@ -73,8 +74,8 @@ pub(super) fn answer(
 /// First-order prediction of a term outside the catalogue, in words.
 pub(super) fn beyond(glance: &Glance) -> String {
     format!(
-        "A first look beyond the catalogue: a term at the {} that depends on {} would explain about {:.0} % of the \
-         unexplained variance.",
+        "A first estimate beyond the catalogue: a term at the {} that depends on {} would explain about {:.0} \
+         % of the unexplained variance.",
         glance.place.word(),
         glance.coordinate,
         glance.error_taken_percent
@@ -169,7 +170,7 @@ fn finding(diagnosis: &Diagnosis, plant: Plant) -> Answer {
             let alpha = certificates().map(|one| one.alpha).fold(0.0, f64::max);
             Answer::new(
                 Tone::Finding,
-                format!("{}, beside something unexplained", missing(names, &[])),
+                format!("{}, and something is unexplained", missing(names, &[])),
             )
             .evidence(format!(
                 "With {} the {error} falls {}.",
@@ -177,8 +178,8 @@ fn finding(diagnosis: &Diagnosis, plant: Plant) -> Answer {
                 from_to(first, last, diagnosis)
             ))
             .confidence(format!(
-                "Certified at a level of {} %. {} {:.0} % of the variance that is unexplained without it; the cause of the rest \
-                 is not identified.",
+                "Certified at a level of {} %. {} {:.0} % of the variance that is unexplained without it. The \
+                 cause of the remaining error is not identified.",
                 significant(100.0 * alpha, 2),
                 match names.len() {
                     1 => "It explains",
@@ -242,7 +243,7 @@ fn fall(diagnosis: &Diagnosis, with: &str) -> String {
     let lags_do = last > (1.0 - RULES.worthwhile) * given;
     match fewest.filter(|rung| lags_do && rung.effects.is_empty()) {
         Some(fewest) => format!(
-            "Beside the fewest lags, {with} lowers the {error} {}; without it, additional lags fit equally well.",
+            "With the fewest lags, {with} lowers the {error} {}; without it, additional lags fit equally well.",
             from_to(rmse(Some(fewest)), last, diagnosis)
         ),
         None => format!(
@@ -256,7 +257,7 @@ fn fall(diagnosis: &Diagnosis, with: &str) -> String {
 fn behaviour(diagnosis: &Diagnosis) -> String {
     let each = diagnosis.missing.iter().map(|name| {
         let text = shown(name, diagnosis.parameters.get(name));
-        // An effect of the user's own says it in its summary.
+        // For a user's own effect, its summary.
         let summary = || diagnosis.model.spec(name).map(|spec| spec.summary);
         text.or_else(|| summary().map(str::to_owned))
             .unwrap_or_else(|| format!("the behaviour of `{name}`"))
@@ -287,14 +288,15 @@ fn missing(names: &[String], sets: &[Vec<String>]) -> String {
     }
 }
 
-/// Surrogates beside named effects.
+/// Surrogates in addition to named effects.
 fn surrogates(answer: &mut Answer, diagnosis: &Diagnosis) {
     if diagnosis.verdict != Verdict::EffectMissing || diagnosis.stand_ins.is_empty() {
         return;
     }
     let several = diagnosis.stand_ins.len() > 1;
     answer.note(format!(
-        "{} {} in the model as {}: not significant beside the named effects, or not identifiable on these records.",
+        "{} {} in the model as {}: not significant together with the named effects, or not identifiable on \
+             these records.",
         joined(&diagnosis.stand_ins),
         if several { "are" } else { "is" },
         if several { "surrogates" } else { "a surrogate" },
@@ -315,7 +317,7 @@ fn records(answer: &mut Answer, diagnosis: &Diagnosis, judged_rmse: Option<f64>)
     }
     match (diagnosis.held_out_by, &diagnosis.quoted) {
         (HeldOutBy::Records, Some(quoted)) => answer.note(format!(
-            "Independent estimate on {}, which no choice used: RMSE {} → {}{}.",
+            "Independent estimate on {}, which played no part in any choice: RMSE {} → {}{}.",
             joined(&quoted.records),
             significant(quoted.before_rmse, 3),
             significant(quoted.validate_rmse, 3),
@@ -330,18 +332,19 @@ fn records(answer: &mut Answer, diagnosis: &Diagnosis, judged_rmse: Option<f64>)
         ),
         (HeldOutBy::Records, None) => {}
         (HeldOutBy::Turns, _) => answer.note(
-            "No record is marked `validate`: errors come from cross-validation over the estimation records. \
+            "No record is marked `validate`, so errors come from cross-validation over the estimation records. \
              A validation record would give an independent estimate.",
         ),
         (HeldOutBy::End, _) => answer.note(
-            "There is one record only: models are fitted to its beginning and validated on its end. A validation record would give an \
-             independent estimate.",
+            "There is only one record: models are fitted to its beginning and validated on its end. A \
+             validation record would give an independent estimate.",
         ),
     }
     let judged = judged_rmse.map(|rmse| significant(rmse, 3));
     if let Some(seconds) = diagnosis.restarted_s {
         answer.note(format!(
-            "Free runs over whole records drift on this plant, so runs that restart from the measurement every {} s decided{}.",
+            "Free runs over whole records drift on this plant. The decision is therefore based on runs that \
+                 restart from the measurement every {} s{}.",
             significant(seconds, 3),
             judged.map_or(String::new(), |rmse| format!(" (RMSE {rmse})"))
         ));
@@ -379,7 +382,7 @@ fn dynamics(answer: &mut Answer, diagnosis: &Diagnosis) {
     }
 }
 
-/// The bench check for candidates that records cannot distinguish, because lags in series commute.
+/// The bench check for candidates that records do not distinguish, because lags in series commute.
 fn bench_check(sets: &[Vec<String>]) -> &'static str {
     let places = |set: &[String]| {
         let of = |name: &String| match name.as_str() {
@@ -398,12 +401,12 @@ fn bench_check(sets: &[Vec<String>]) -> &'static str {
     let across = |place: Place| sets.iter().any(|set| set.len() > 1 && set.contains(&place));
     match (across(Place::Jet), across(Place::Sensor)) {
         (true, _) => {
-            "Bench check: play the same command with the tunnel off. What stays belongs to the actuator; what disappears \
-             belongs to the flow."
+            "Bench check: play the same command with the tunnel off. The part of the response that remains \
+             belongs to the actuator, the part that disappears to the flow."
         }
         (false, true) => {
-            "Bench check: give the sensor alone a step (its heating current, or a shutter). What stays belongs to the sensor; \
-             what disappears belongs to the flow."
+            "Bench check: apply a step to the sensor alone (its heating current, or a shutter). The part of \
+             the response that remains belongs to the sensor, the part that disappears to the flow."
         }
         (false, false) => "",
     }

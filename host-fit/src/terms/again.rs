@@ -1,5 +1,5 @@
-//! A second copy of an effect. A law that differs from the catalogue's often looks like two copies: two
-//! reservoirs, two time constants of a drift, two lags of a film.
+//! A second copy of an effect. An effect whose equation differs from the catalogue's often looks like two copies:
+//! two reservoirs, two time constants of a drift, two lags of a film.
 
 use super::RULES;
 use super::judge::Judged;
@@ -10,9 +10,9 @@ use crate::parallel;
 use model_core::effect::Spec;
 
 impl Search<'_> {
-    /// `hypothesis` with a second copy of one of its effects, fitted from the best starting points of its
-    /// card. `None` if it has no effect outside the delay law, no copy is stable, or a few iterations leave every copy far
-    /// from an error of `enough`.
+    /// `hypothesis` with a second copy of one of its effects, fitted from the best starting points of its card.
+    /// `None` if it has no effect except a delay law, if no copy is stable, or if after a few iterations every copy
+    /// is far from an error of `enough`.
     pub(crate) fn again(
         &self,
         hypothesis: &Hypothesis,

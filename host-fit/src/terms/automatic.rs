@@ -1,5 +1,5 @@
-//! The structure of a base model, chosen by held-out error: as many lags as earn
-//! their place, the delay law that does better, the sensor's zero where it is off.
+//! The structure of a base model, chosen by the validation error: the number of lags, the delay law, and the
+//! sensor's offset.
 
 use super::bench::Bench;
 use super::evidence::p_value;
@@ -18,23 +18,23 @@ use crate::simulate::SimulateError;
 use model_core::effects::{ConstantDelay, SaturatingDelay};
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// From which level of y on, in inner units, a delay is tried as that of the attached flow …
+/// Level of y, in inner units, above which a separate delay of the attached flow is tried …
 const LEVEL: f64 = 0.6;
-/// … and by how many samples at least it differs from that at rest.
+/// … and the least difference between that delay and the delay at rest, samples.
 const LEAST_RISE: f64 = 4.0;
 
-/// Averaging times of y that a delay law is tried with beside that of eq. (1), samples: a flow that carries the jets at
-/// the speed of the moment needs none.
+/// Averaging times of y that are tried with a delay law in addition to that of eq. (1), samples. A flow that
+/// carries the jets with its present velocity needs no averaging.
 const AVERAGES: [u32; 3] = [2, 50, 125];
 
-/// A base model and what its search took.
+/// A base model and the effort of its search.
 #[derive(Clone, Debug)]
 pub struct Automatic {
     /// The model, in the user's units.
     pub model: Model,
     /// Structures that were refitted in full.
     pub tried: usize,
-    /// Evaluations of the direct search that settled the delays.
+    /// Evaluations of the direct search over the delays.
     pub evaluations: usize,
     /// Why that ended.
     pub stop: StopReason,
@@ -44,18 +44,17 @@ pub struct Automatic {
 pub struct Frame<'a> {
     /// Delay laws of which the best is kept.
     pub laws: &'a [Delay],
-    /// Whether delays between samples are kept even where they do not pay.
+    /// Whether delays between samples are kept even if they do not lower the error enough.
     pub interpolated: bool,
-    /// The direct search that settles the delays.
+    /// The direct search over the delays.
     pub settings: Settings,
 }
 
-/// The base model of `records`: the structure by validation error, its input delays after the best of the laws, then
-/// lags and delays by mesh adaptive direct search on the free run.
+/// The base model of `records`: the structure by validation error, then the best delay law, then lags and delays by
+/// mesh adaptive direct search on the free run.
 ///
 /// # Errors
-/// [`SimulateError`] when no law gives a stable free run; nothing to learn from is
-/// `None`.
+/// [`SimulateError`] if no law gives a stable free run; `None` without data to fit.
 pub fn base_model(
     records: &[Record],
     how: &Frame<'_>,
@@ -131,11 +130,11 @@ pub fn base_model(
     };
     // The search starts from a delay law only if it is significantly better than a constant delay.
     let root = Hypothesis::new(without_needless_law(&judge, root.judged.clone(), laws));
-    progress("the same of second order");
+    progress("second order with the same delay");
     let second = second_order(&judge, &root, may_be_constant);
     let mut found = search.run(root, Some(&|| second.iter().cloned().collect()));
-    // Input coefficients of both signs (a zero, as of an inverse response) are outside first and second order: the search
-    // starts again from such a model if it is clearly better than the best structure so far.
+    // Input coefficients of both signs (a zero, as of an inverse response) are outside first and second order. If
+    // such a model is clearly better than the best structure so far, the search starts again from it.
     let lead = |hypothesis: &&Hypothesis| {
         let b = &hypothesis.judged.model().b;
         b.iter().any(|b| *b > 0.0) && b.iter().any(|b| *b < 0.0)
@@ -150,7 +149,7 @@ pub fn base_model(
     if let Some(plain) = plain_enough(&found) {
         found.best = plain;
     }
-    // With the lags that were found another law may do better than the one that was chosen without them.
+    // With the lags that were found, another law may have a lower error than the one that was chosen without them.
     let mut others: Vec<Delay> = roots
         .iter()
         .map(|root| root.judged.model().delay.clone())
@@ -189,7 +188,7 @@ pub fn base_model(
         let best = tried
             .into_iter()
             .min_by(|a, b| a.size().total_cmp(&b.size()));
-        // The averaging time is a parameter and has to earn its place like all others.
+        // The averaging time is a parameter and must lower the error like every other parameter.
         if let Some(best) = best.filter(|best| best.size() + RULES.price < found.best.judged.size())
         {
             found.best.judged = best;
@@ -215,8 +214,9 @@ pub fn base_model(
     }))
 }
 
-/// The best first or second order among the fitted structures, if its score is nearly that of the best structure and the
-/// difference is not significant. Longer lags and dispersed delays imitate a second time constant and bias the delay.
+/// The best first- or second-order model among the fitted structures, if its score is close to that of the best
+/// structure and the difference is not significant. Longer lags and dispersed delays imitate a second time constant
+/// and bias the delay.
 fn plain_enough(found: &Found) -> Option<Hypothesis> {
     let is_plain = |hypothesis: &&Hypothesis| {
         let mut terms = hypothesis.terms.iter();
@@ -230,8 +230,8 @@ fn plain_enough(found: &Found) -> Option<Hypothesis> {
     (near && !told && !is_plain(&best)).then(|| plain.clone())
 }
 
-/// The model with a constant delay where its law is no more than that over the levels of the records: a law has to vary
-/// by more than a sample, to be positive, and to err less by a test.
+/// The model with a constant delay, if its law is not distinguishable from one over the levels of the records. A
+/// law must vary by more than a sample, be positive, and have a significantly smaller error.
 fn without_needless_law(judge: &Judge, judged: Judged, laws: &[Delay]) -> Judged {
     let model = judged.model();
     let constant_allowed = laws.iter().any(|law| matches!(law, Delay::Fixed { .. }));
@@ -275,7 +275,7 @@ fn without_needless_law(judge: &Judge, judged: Judged, laws: &[Delay]) -> Judged
     }
 }
 
-/// The model after a delay law that follows the mean of y over `window` samples.
+/// The model with a delay law that depends on the mean of y over `window` samples.
 fn with_average(model: &Model, law: &Delay, window: u32) -> Model {
     let mut other = model.clone();
     if !model.delay.is_alike(law) {
@@ -285,7 +285,7 @@ fn with_average(model: &Model, law: &Delay, window: u32) -> Model {
     other
 }
 
-/// The law that ends at a level, about as the law of `model` is.
+/// The delay law with a finite end that is closest to the law of `model`.
 fn saturating(model: &Model) -> Delay {
     let at = |level: f64| model.delay.present(level, model.sample_period_s);
     let rise = at(0.0) - at(LEVEL);
@@ -294,8 +294,7 @@ fn saturating(model: &Model) -> Delay {
     Delay::of::<SaturatingDelay<f64>>(&parameters, model.delay.factors(), true)
 }
 
-/// The model with its delays rounded to samples, as eq. (4) has them, if the held-out
-/// error bears it.
+/// The model with its delays rounded to samples, as in eq. (4), if the validation error rises only slightly.
 fn on_samples_unless_it_costs(judge: &Judge, judged: Judged) -> Judged {
     let mut model = judged.model().clone();
     model.delay_on_samples();

@@ -20,7 +20,7 @@ pub struct Bench {
     pub mid_run: bool,
     /// The record-to-record offset of the sensor, if there is one.
     pub moving_zero: Option<MovingZero>,
-    /// Free runs are restarted after so many samples, for rigs that drift.
+    /// Free runs are restarted after this many samples, for plants that drift.
     pub restarted: Option<usize>,
 }
 
@@ -53,9 +53,9 @@ impl Bench {
     }
 }
 
-/// Samples after which free runs of `model` over `records` (both in the same units) are restarted: a rig that drifts. None
-/// where the first-order `reference` forgets its initial state well within the records: a model that lacks an input may
-/// remember for ever where the rig does not.
+/// Samples after which free runs of `model` over `records` (both in the same units) are restarted, for plants that
+/// drift. `None` if the first-order `reference` forgets its initial state well within the records: a model that
+/// lacks an input may have a pole at 1 although the plant has none.
 pub(crate) fn restarted(
     model: &Model,
     records: &[Record],
@@ -87,7 +87,7 @@ mod tests {
         assert!(!bench.mid_run && !bench.judge.options.constant);
     }
 
-    /// The poles of a model do not make a rig drift that its records show at rest again and again.
+    /// If the records return to rest repeatedly, the plant does not drift, whatever the poles of the model are.
     #[test]
     fn a_rig_that_regulates_itself_is_not_restarted() {
         let records = records(&[], &[], 3);

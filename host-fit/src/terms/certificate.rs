@@ -13,8 +13,8 @@ use crate::residual::NoiseSource;
 const STEPS: usize = 8;
 const HALVINGS: i32 = 8;
 
-/// ln of the e-value of a model with this `evidence` (ln, nats) against one `without` what is tested, the best of so many
-/// `tried` (theory 4.5).
+/// ln of the e-value of a model with this `evidence` (ln, nats) against the evidence `without` the tested effect,
+/// the best of this many `tried` models (theory 4.5).
 pub(crate) fn log_e(evidence: f64, without: f64, tried: usize) -> f64 {
     evidence - without - (tried.max(1) as f64).ln()
 }
@@ -57,7 +57,8 @@ impl MostLikely {
         Some(best)
     }
 
-    /// `model` as it is, with the most likely noise; its colour is searched near that of a `similar` model.
+    /// `model` with unchanged parameters and the most likely noise; its colour is searched near that of a `similar`
+    /// model.
     fn at(
         judge: &Judge,
         model: &Model,

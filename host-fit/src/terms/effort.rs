@@ -1,16 +1,17 @@
-//! The end of a search: counted in what it refits, since a limit in seconds would depend on the machine.
+//! The end of a search. It is measured by the number of refitted parameters, because a limit in seconds would
+//! depend on the machine.
 
 use super::RULES;
 use crate::model::Model;
 
-/// What a search may still do: parameters of the models that it refits.
+/// The remaining effort of a search: parameters of the models that it may refit.
 #[derive(Debug)]
 pub struct Effort {
     left: f64,
 }
 
 impl Effort {
-    /// What one search may do, or several that share it.
+    /// The effort of one search, or of several that share it.
     #[must_use]
     pub fn of_a_search() -> Self {
         Self { left: RULES.effort }

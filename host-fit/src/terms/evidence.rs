@@ -8,7 +8,7 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 /// Standard deviation of a normal distribution over its median absolute deviation.
 const NORMAL: f64 = 1.4826;
 
-/// Free-run error y − y_sim of a model on the validation records, warm-up left out.
+/// Free-run error y − y_sim of a model on the validation records, without the warm-up.
 #[derive(Clone, Debug)]
 pub(crate) struct HeldOut {
     pub(crate) errors: Vec<Vec<f64>>,
@@ -44,7 +44,7 @@ impl HeldOut {
         (self.measured / self.samples.max(1) as f64).sqrt()
     }
 
-    /// Correlation length: number of samples that carry the information of one.
+    /// Correlation length: number of samples per independent sample.
     pub(crate) fn correlated(&self) -> f64 {
         (self.block as f64 / RULES.correlation_times).max(1.0)
     }
@@ -88,11 +88,10 @@ fn block(errors: &[Vec<f64>]) -> usize {
 
 /// One-sided p-value of "`better` has the smaller validation error than `worse`".
 ///
-/// With d the difference of the two runs and m the mean of their errors, the gain Σ e² − Σ e'² is 2 Σ m·d. It
-/// is positive if the regression of m on d has a positive slope. The test is Student's on that slope, with a
-/// cluster-robust standard error over blocks and as many degrees of freedom as there are blocks in which the
-/// runs differ. A paired test on the blocks' gains would lose power where the gain is concentrated in few
-/// blocks.
+/// With d the difference of the two runs and m the mean of their errors, the gain Σ e² − Σ e'² is 2 Σ m·d. It is
+/// positive if the regression of m on d has a positive slope. The test is Student's t test on that slope. The
+/// standard error is cluster-robust over blocks, with as many degrees of freedom as blocks in which the runs
+/// differ. A paired test on the blocks' gains would lose power if the gain is concentrated in few blocks.
 pub(crate) fn p_value(worse: &HeldOut, better: &HeldOut) -> f64 {
     let block = better.block;
     // Per block: Σ m·d and Σ d·d.
@@ -118,7 +117,7 @@ pub(crate) fn p_value(worse: &HeldOut, better: &HeldOut) -> f64 {
     student(product, error, (effective - 1.0).max(1.0))
 }
 
-/// The common end of two series, whose warm-ups differ in length.
+/// The common end of two series whose warm-ups differ in length.
 fn last_of_both<'a>(a: &'a [f64], b: &'a [f64]) -> (&'a [f64], &'a [f64]) {
     let n = a.len().min(b.len());
     (&a[a.len() - n..], &b[b.len() - n..])
@@ -193,7 +192,8 @@ mod tests {
         assert!((7..=35).contains(&alarms), "{alarms} of {trials}");
     }
 
-    /// Two models that differ in the first second of each record: equally wrong there, or one of them right.
+    /// Two models that differ in the first second of each record: both are equally wrong there, or one of them is
+    /// right.
     #[test]
     fn a_gain_in_few_places_counts_and_a_chance_does_not() {
         let mut rng = ChaCha8Rng::seed_from_u64(8);
@@ -217,7 +217,7 @@ mod tests {
             alarms += usize::from(p_value(&off_by(0.5), &off_by(-0.5)) < 0.05);
             found += usize::from(p_value(&off_by(1.0), &off_by(0.0)) < 0.01);
         }
-        // Six clusters: the test is a little off its level.
+        // Six clusters: the level of the test is not exact.
         assert!((5..=45).contains(&alarms), "{alarms} of {trials}");
         assert!(found > 320, "{found} of {trials}");
     }

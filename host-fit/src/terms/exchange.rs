@@ -142,8 +142,8 @@ impl Search<'_> {
         hypothesis
     }
 
-    /// The effects of a hypothesis on the lags of `root`; `None` if it has no other terms. Lags that were chosen before
-    /// an effect was there imitate it.
+    /// The effects of a hypothesis with the lags of `root`; `None` if it has no other terms. Lags that were chosen
+    /// before an effect was in the model imitate it.
     pub(super) fn without_lags(
         &self,
         hypothesis: &Hypothesis,

@@ -86,7 +86,7 @@ pub(crate) fn folds(records: &[Record]) -> (Vec<Fold>, HeldOutBy) {
         return (vec![fold], HeldOutBy::Records);
     }
     if let [only] = identify.as_slice() {
-        // Before the first edge there is nothing to learn from.
+        // Before the first edge the records do not identify the response.
         let rest = first_edge(&only.u).unwrap_or(0);
         let from = rest + (RULES.learned_share * (only.len() - rest) as f64) as usize;
         let fold = Fold {
@@ -206,7 +206,7 @@ mod tests {
         assert_eq!(folds[0].judging[0].record.len(), 10);
     }
 
-    /// Otherwise a step test with a long rest in front is learned from its rest.
+    /// Otherwise the estimation part of a step test with a long rest would contain the rest only.
     #[test]
     fn the_only_record_is_divided_from_its_first_edge_on() {
         let mut late = record("a", Use::Identify);

@@ -99,7 +99,7 @@ impl Search<'_> {
             };
             fit(&all, &learning, &options)
         };
-        // First-order coefficients may make the free run diverge: then the fit starts from 0.
+        // First-order coefficients may make the free run diverge; the fit then starts from 0.
         with(true).or_else(|_| with(false)).ok()
     }
 
@@ -123,8 +123,8 @@ impl Search<'_> {
         })
     }
 
-    /// The same and, where an effect is at a bound, also the hypothesis with it: beside a base that is too narrow the
-    /// right effect may go to a bound, and come back when a further term is there.
+    /// The same and, if an effect is at a bound, also the hypothesis with it. If the base model lacks terms, the
+    /// right effect may go to a bound and leave it when a further term is added.
     pub(super) fn finish_with_bent(
         &self,
         terms: Vec<Term>,
@@ -362,7 +362,7 @@ mod tests {
             (&[1][..], &[1][..])
         );
         assert_eq!(model.effects.len(), 1);
-        // Nothing is dropped where there are lags only, or an effect only.
+        // Models that have only lags, or only an effect, keep all terms.
         assert!(search.without_lags(&anew, &root).is_none());
         assert!(search.without_lags(&root, &root).is_none());
     }

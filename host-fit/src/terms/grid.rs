@@ -24,7 +24,7 @@ pub(super) fn hides(spec: &Spec) -> bool {
 /// Parameter vectors from which `spec` is screened, for `model`.
 #[must_use]
 pub(super) fn grid(spec: &Spec, model: &Model, known: &Known) -> Vec<Vec<f64>> {
-    // y and u are of order 1 here.
+    // y and u are of order 1 in inner units.
     let facts = known.facts(model, 1.0, 1.0);
     if let Some(rows) = rows(spec, &facts) {
         return rows;
@@ -58,7 +58,7 @@ pub(super) fn grid(spec: &Spec, model: &Model, known: &Known) -> Vec<Vec<f64>> {
         }
     };
     let mut all = combinations(spec.parameters.iter().map(along));
-    // Of a pair of levels, the first is the upper one.
+    // In a pair of levels, the first is the upper one.
     let levels: Vec<usize> = (0..spec.parameters.len())
         .filter(|i| {
             let p = &spec.parameters[*i];

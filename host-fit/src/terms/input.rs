@@ -1,4 +1,4 @@
-//! A measured channel as a second input of the plant: a heater beside the first one, a fan, the ambient temperature.
+//! A measured channel as a second input of the plant: a second heater, a fan, the ambient temperature.
 
 use super::RULES;
 use crate::data::Record;
@@ -10,12 +10,12 @@ use crate::residual::correlation;
 use crate::user_effect::{Definition, channel_signal};
 use model_core::effects::SPECS;
 
-/// Channels are ranked among so many, by averages of all records to so many samples: for the time it takes.
+/// Channels are ranked with this many samples, averages over all records, to limit the time.
 const RANKED: usize = 256;
 const RANKED_SAMPLES: usize = 2000;
 
-/// Those of [`measured_inputs`] that a diagnosis of `given` tries: where there are many, those of which a first-order lag with
-/// dead time explains most of what `given` leaves.
+/// Those of [`measured_inputs`] that a diagnosis of `given` tries. If there are many, those whose response (a
+/// first-order lag with dead time) explains most of the residual of `given`.
 #[must_use]
 pub(crate) fn leading_inputs(given: &Model, records: &[Record]) -> Vec<&'static Definition> {
     let inputs = measured_inputs(records);
@@ -70,14 +70,15 @@ pub(crate) fn leading_inputs(given: &Model, records: &[Record]) -> Vec<&'static 
         .collect()
 }
 
-/// A signal of all records, one after the other.
+/// A signal over all records, joined.
 fn joined(records: &[Record], of: impl Fn(&Record) -> Vec<f64>) -> Vec<f64> {
     records.iter().flat_map(of).collect()
 }
 
-/// For each channel of all `records` that varies, that no effect of the catalogue reads, and that is not y, the command or a
-/// clock again, the effect that adds its response to the reading: a first-order lag with dead time of the channel's deviation
-/// from its first value, in parts of its range. The reading's zero is that of a record at rest, when the channel had that value.
+/// For each channel of all `records` that varies, that no effect of the catalogue reads, and that is not a copy of
+/// y, the command or a clock: the effect that adds its response to the reading. The response is a first-order lag
+/// with dead time of the channel's deviation from its first value, as a fraction of its range. The reading's zero
+/// is that of a record at rest, when the channel had that value.
 #[must_use]
 pub(crate) fn measured_inputs(records: &[Record]) -> Vec<&'static Definition> {
     let Some(first) = records.first() else {
@@ -99,7 +100,7 @@ pub(crate) fn measured_inputs(records: &[Record]) -> Vec<&'static Definition> {
         if !(range.is_finite() && range > 0.0) {
             return None;
         }
-        // Correlations are of numbers of order one.
+        // Correlations are computed with numbers of order one.
         let scaled: Vec<f64> = own.iter().map(|v| (v - low) / range).collect();
         let is_again = |known: &Vec<f64>| {
             correlation(&scaled, known).is_some_and(|(r, _)| r.abs() > RULES.same_quantity)
@@ -155,7 +156,7 @@ high = 0.5
 starts = [0.0, 0.02, 0.08, 0.25]
 "#
     );
-    // A name that is too long is none of an effect.
+    // A name that is too long is not valid for an effect.
     Definition::from_toml(&text, channel).ok()
 }
 

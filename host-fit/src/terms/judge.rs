@@ -80,7 +80,7 @@ fn root_mean(variances: &[Vec<f64>]) -> f64 {
 }
 
 impl Judge {
-    /// A judge over `records`. With `restarted`, free runs are restarted after so many samples. `None`
+    /// A judge over `records`. With `restarted`, free runs are restarted after this many samples. `None`
     /// without estimation records.
     #[must_use]
     pub fn new(records: &[Record], restarted: Option<usize>, options: FitOptions) -> Option<Self> {
@@ -155,8 +155,8 @@ impl Judge {
         Some(self.options.level_scatter?.deviation)
     }
 
-    /// The error over the noise level; 1 is the least attainable. Where slow noise is unknown, so is the noise level,
-    /// and the ratio is never near 1.
+    /// The error over the noise level; 1 is the least attainable. If the slow noise is unknown, the noise level is
+    /// unknown too, and the ratio is never close to 1.
     #[must_use]
     pub fn over_noise(&self, rmse: f64) -> f64 {
         match self.noise_source {
@@ -394,7 +394,8 @@ mod tests {
     use crate::model::Model;
     use crate::terms::Bench;
 
-    /// One step of a first order, at rest long before its end: what is validated there is noise about a level.
+    /// One step of a first-order plant that is at rest long before its end: the validation part is noise about a
+    /// level.
     #[test]
     fn a_step_test_is_judged_by_its_motion() {
         let u: Vec<f64> = (0..600).map(|k| f64::from(u8::from(k >= 100))).collect();

@@ -293,8 +293,8 @@ mod tests {
         );
     }
 
-    /// A lag that is not in the plant is never certified; the product that is there always is. What both models have
-    /// costs neither anything.
+    /// A lag that is not in the plant is never certified; the product that is there always is. Terms common to both
+    /// models do not reduce the evidence.
     #[test]
     fn certificates_are_of_what_is_there() {
         for seed in 0..12 {

@@ -27,7 +27,7 @@ pub(crate) fn baselines(frame: &Model, records: &[&Record]) -> Vec<Model> {
 fn linear(frame: &Model, a: Vec<f64>, b: Vec<f64>, constant: f64, delay: f64) -> Model {
     let lags: Vec<u16> = (1..=a.len() as u16).collect();
     let whole = delay.max(0.0);
-    // Factors of a law are relative: of a delay below a sample there is none.
+    // The factors of a law are relative, so a delay below one sample cannot have one.
     let delays: Vec<u16> = (0..b.len() as u16)
         .map(|later| (whole.round().clamp(0.0, 60_000.0) as u16) + later)
         .collect();
@@ -49,9 +49,9 @@ fn linear(frame: &Model, a: Vec<f64>, b: Vec<f64>, constant: f64, delay: f64) ->
     }
 }
 
-/// The better one of first and second order, with one delay and without products: the model for records whose command
-/// changes too seldom to identify how anything depends on y. Fit and choice use all samples, since none that could be
-/// held out follow a change of the command.
+/// The better one of first and second order, with one delay and without products. It is the model for records whose
+/// command changes too seldom to identify how any parameter depends on y. Fit and choice use all samples, because
+/// no later samples follow a change of the command.
 pub(super) fn alone(judge: &Judge, frame: &Model) -> Option<Model> {
     let found = Baselines::fit(&judge.everything());
     let period = frame.sample_period_s;
@@ -71,8 +71,8 @@ pub(super) fn alone(judge: &Judge, frame: &Model) -> Option<Model> {
     best.map(|fit| fit.model)
 }
 
-/// A second order with the delay law and the products of `root`, which is of first order. A search that adds one term at
-/// a time finds it late, because the delay of the first order contains the second lag as well.
+/// A second order with the delay law and the products of `root`, which is of first order. A search that adds one
+/// term at a time finds it late, because the delay of the first-order model contains the second lag.
 pub(super) fn second_order(
     judge: &Judge,
     root: &Hypothesis,
@@ -110,7 +110,7 @@ pub(super) fn second_order(
     })
 }
 
-/// A recursion with its inputs as one, between samples.
+/// A recursion whose inputs are combined into one, between samples.
 fn one_input(frame: &Model, found: Recursion) -> Model {
     let whole: f64 = found.b.iter().sum();
     let moment: f64 = found.b.iter().enumerate().map(|(i, b)| i as f64 * b).sum();

@@ -1,10 +1,10 @@
 //! Structure selection: lags of the flow, the sensor's offset, physical effects.
 //!
 //! A hypothesis is a model with a list of [`Term`]s added to the base model of the lowest order. [`Screen`]
-//! predicts to first order how much of the free-run error hundreds of further terms would explain, at the
-//! cost of one run each. [`Search`] refits the most promising, scores them on validation records and
-//! continues from the best. Lags and effects are moves of the same search: both must pay for their
-//! parameters, and an effect must beat the best base model without it.
+//! predicts to first order how much of the free-run error hundreds of further terms would explain, at the cost of
+//! one run each. [`Search`] refits the most promising terms, scores them on validation records and continues from
+//! the best. Lags and effects are moves of the same search: both must lower the error by more than their penalty,
+//! and an effect must beat the best base model without it.
 
 mod again;
 mod automatic;

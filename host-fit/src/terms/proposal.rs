@@ -1,4 +1,4 @@
-//! Sets of candidates whose joint gain pays for their parameters.
+//! Sets of candidates whose joint gain exceeds the penalty of their parameters.
 
 use super::RULES;
 use super::screen::Screen;
@@ -18,12 +18,12 @@ pub struct Proposal {
     pub coefficients: Vec<Vec<f64>>,
     /// Predicted validation mean square error over the present one.
     pub left: f64,
-    /// ½ ln of `left` plus the penalty of the terms; negative if the set pays.
+    /// ½ ln of `left` plus the penalty of the terms; negative if the gain exceeds the penalty.
     pub score: f64,
 }
 
 impl Screen<'_> {
-    /// Single terms and pairs whose gain pays for their parameters, best first.
+    /// Single terms and pairs whose gain exceeds their penalty, best first.
     #[must_use]
     pub fn proposals(&self, table: &Table) -> Vec<Proposal> {
         let candidates = &table.candidates;

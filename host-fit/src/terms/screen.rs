@@ -118,8 +118,8 @@ impl<'a> Screen<'a> {
         self.joined(errors.iter().map(Vec::as_slice))
     }
 
-    /// Independent blocks of the joined series: whole records, because record-to-record scatter is constant
-    /// within one. If records are few, pieces of them of at least so many samples.
+    /// Independent blocks of the joined series: whole records, because record-to-record scatter is constant within
+    /// one. If there are few records, pieces of them with at least this many samples.
     pub(super) fn blocks(&self, samples: usize) -> Vec<Range<usize>> {
         let most = self.records.iter().map(|r| r.len()).max().unwrap_or(0);
         let pieces = RULES.fewest_pieces.div_ceil(self.records.len().max(1));
@@ -324,7 +324,7 @@ impl<'a> Screen<'a> {
         moves
     }
 
-    /// The parameters after moving the lags by so many samples, to first order.
+    /// The parameters after moving the lags by this many samples, to first order.
     pub(super) fn values_with(&self, moves: &Moves, steps: &[i32]) -> Vec<f64> {
         let wanted = |direction: usize| {
             let of_term = |(along, step): (&Vec<f64>, &i32)| {

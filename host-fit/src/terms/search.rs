@@ -28,14 +28,15 @@ pub struct Hypothesis {
     pub judged: Judged,
     /// Whether further terms were already screened on it.
     pub(super) expanded: bool,
-    /// Whether it descends from the given structure rather than from the lowest-order model.
+    /// Whether it descends from the given structure instead of from the lowest-order model.
     pub(super) from_given: bool,
-    /// Whether an effect is at a bound of its range: further terms are screened on it, but it is no result.
+    /// Whether an effect is at a bound of its range. Further terms are screened on such a hypothesis, but it cannot
+    /// be a result.
     pub(super) bent: bool,
 }
 
 impl Hypothesis {
-    /// A model as it is, without further terms.
+    /// A model without further terms.
     #[must_use]
     pub fn new(judged: Judged) -> Self {
         Self {
@@ -70,7 +71,7 @@ impl Hypothesis {
         self.terms.iter().map(Term::cost).sum()
     }
 
-    /// ln of the validation error plus the penalty of the terms; the lower the better.
+    /// ln of the validation error plus the penalty of the terms; lower is better.
     #[must_use]
     pub fn score(&self) -> f64 {
         score(self.judged.rmse(), self.cost())
@@ -81,7 +82,7 @@ impl Hypothesis {
         Term::all_of(other, self.judged.model()).is_some_and(|terms| terms.is_empty())
     }
 
-    /// The one with the lowest error among `all` that have none of these effects.
+    /// The hypothesis with the lowest error among those of `all` that have none of these effects.
     pub(crate) fn best_without<'a>(
         all: impl Iterator<Item = &'a Self>,
         effects: &[&str],
@@ -110,7 +111,7 @@ pub(super) fn score(rmse: f64, cost: usize) -> f64 {
     rmse.ln() + RULES.price * cost as f64
 }
 
-/// Makes further roots of a search. Behind a reference: the search is compiled once for all its callers.
+/// Makes further roots of a search. It is passed by reference so that the search is compiled once for all callers.
 pub(crate) type Second<'a> = &'a dyn Fn() -> Vec<Hypothesis>;
 
 /// The result of a search.
@@ -161,7 +162,7 @@ pub struct Search<'a> {
     pub effects: bool,
     /// Largest number of effects.
     pub most_effects: usize,
-    /// Terms are added only to hypotheses whose terms have fewer parameters.
+    /// Terms are added only to hypotheses whose terms have fewer parameters than this.
     pub most_parameters: usize,
     /// When set, the search ends with the best hypothesis so far.
     pub interrupt: &'a AtomicBool,
@@ -170,7 +171,7 @@ pub struct Search<'a> {
 }
 
 impl<'a> Search<'a> {
-    /// A search for at most so many effects that reports no progress.
+    /// A search for at most this many effects that reports no progress.
     pub(crate) fn silent(judge: &'a Judge, most_effects: usize, interrupt: &'a AtomicBool) -> Self {
         Self {
             judge,
@@ -206,7 +207,8 @@ impl Search<'_> {
     pub fn root(&self, given: &Model, mid_run: bool) -> Result<Hypothesis, SimulateError> {
         let learning = self.judge.learning(0);
         let mut bare = given.clone();
-        // Effects that the user added stay; drift and other disturbance terms must earn their place again.
+        // Effects that the user added stay; drift and other disturbance terms must lower the error again to be
+        // kept.
         let mut kept = std::mem::take(&mut bare.effects);
         kept.retain(|added| NUISANCES.iter().all(|spec| spec.name != added.name));
         let mut model = lean_base(&bare, &learning)?.model;
@@ -253,9 +255,9 @@ impl Search<'_> {
         })
     }
 
-    /// Further roots: the structure of `given`, and `root` with each input that was measured beside the command. Without
-    /// such an input the lowest order has taken a wrong delay and time constant, from which few iterations do not return, so
-    /// both are fitted from fresh starts.
+    /// Further roots: the structure of `given`, and `root` with each measured input. Without such an input the
+    /// lowest-order model has a wrong delay and time constant, from which a few iterations do not return. Both are
+    /// therefore fitted from fresh starts.
     pub(crate) fn second_roots(&self, given: &Model, root: &Hypothesis) -> Vec<Hypothesis> {
         let base = root.judged.model();
         let learning = self.judge.learning(0);
@@ -288,16 +290,17 @@ impl Search<'_> {
             .collect()
     }
 
-    /// Searches from `root`, and from `second` unless the first round reaches the noise level, until no
-    /// remaining candidate pays for its parameters. If the error is still far above the noise, one extension
-    /// follows the less promising candidates of the root and of the best hypothesis. Where the noise level is not
-    /// reached, lags are searched anew beside the effects of the best hypothesis.
+    /// Searches from `root`, and from `second` unless the first round reaches the noise level, until the gain of
+    /// every remaining candidate is below its penalty. If the error is still far above the noise, one extension
+    /// follows the less promising candidates of the root and of the best hypothesis. If the noise level is not
+    /// reached, lags are searched again with the effects of the best hypothesis.
     #[must_use]
     pub fn run(&self, root: Hypothesis, second: Option<Second<'_>>) -> Found {
         self.run_within(root, second, &mut Effort::of_a_search())
     }
 
-    /// [`run`](Self::run) within an effort that several searches share; once it is spent, no further models are tried.
+    /// [`run`](Self::run) with an effort that several searches share; when it is used up, no further models are
+    /// tried.
     #[must_use]
     pub fn run_within(
         &self,
@@ -306,7 +309,7 @@ impl Search<'_> {
         effort: &mut Effort,
     ) -> Found {
         let (mut all, mut tried) = self.rounds(root, second, effort);
-        (self.progress)("leaving out what is not needed");
+        (self.progress)("removing terms that are not needed");
         let root = all[0].clone();
         let end = best(&all, |_| true);
         let bare_end = best(&all, Hypothesis::is_bare);
@@ -315,14 +318,14 @@ impl Search<'_> {
         let bare = if bare_end == end {
             found.clone()
         } else {
-            (self.progress)("the same for the best without effects");
+            (self.progress)("removing terms from the best model without effects");
             self.pruned(all[bare_end].clone(), &root)
         };
         if self.over(&found) > RULES.at_the_floor
             && !effort.is_spent()
             && let Some(start) = self.without_lags(&found, &root)
         {
-            (self.progress)("lags anew beside the effects");
+            (self.progress)("searching the lags again with the effects");
             let (anew, further) = self.rounds(start, None, effort);
             tried += further;
             let other = &anew[best(&anew, |_| true)];
@@ -435,7 +438,7 @@ impl Search<'_> {
         for hypothesis in finished {
             keep(all, hypothesis);
         }
-        // Only those with a lower error than every result.
+        // Only hypotheses with a lower error than every result.
         let least = all[best(all, |_| true)].score() - RULES.price;
         for hypothesis in bent.into_iter().filter(|bent| bent.score() < least) {
             keep(all, hypothesis);
@@ -467,7 +470,7 @@ impl Search<'_> {
         {
             chosen.push((rival, self.effects));
         }
-        // Results of a wider round are screened whether or not they lead.
+        // Results of a wider round are screened even if they are not the best.
         let new = leading(all, |i| {
             since.is_some_and(|since| *i >= since) && !chosen.iter().any(|(c, _)| c == i)
         });
@@ -580,8 +583,8 @@ impl Search<'_> {
             Some((score(rmse, parent.cost() + cost), at, fit))
         });
         order::ascending(&mut brief, |one| one.0);
-        // Refitted in full in any case: the best without effects and the best on each screened model, for
-        // which a brief fit says less. Proposals that converge to the same model are fitted once.
+        // Refitted in full in any case: the best without effects, and the best on each screened model, for which
+        // the error of a brief fit is less informative. Proposals that converge to the same model are fitted once.
         let mut leading: Vec<(usize, Fit)> = Vec::new();
         let (mut has_bare, mut met): (bool, Vec<Vec<Term>>) = (false, Vec::new());
         let mut heirless: Vec<usize> = pool.iter().map(|(index, _)| *index).collect();
@@ -723,7 +726,7 @@ fn keep(all: &mut Vec<Hypothesis>, mut hypothesis: Hypothesis) {
 /// Key by which terms are compared.
 type TermKey = (String, Option<model_core::recursion::Grading>);
 
-/// The key of a hypothesis with further terms. What was tried from a bound may still be tried from elsewhere.
+/// The key of a hypothesis with further terms. Terms tried on a hypothesis at a bound may be tried again on others.
 fn signature(before: &Hypothesis, added: &[Term]) -> Vec<TermKey> {
     let mut keys: Vec<TermKey> = before.terms.iter().chain(added).map(Term::key).collect();
     keys.extend(before.bent.then(|| ("at a bound".to_owned(), None)));

@@ -1,4 +1,4 @@
-//! How much of a candidate's change of the free run unnamed terms cannot imitate.
+//! The part of a candidate's change of the free run that unnamed terms cannot imitate.
 
 use super::screen::Screen;
 use super::table::Table;
@@ -66,9 +66,9 @@ impl Unnamed {
 }
 
 impl Screen<'_> {
-    /// The part of the change by `other` that neither this model's parameters nor up to `most` columns of
-    /// `unnamed` (greedily selected) can imitate. Blocks of `block` samples of the error count as
-    /// independent. `None` if it diverges or changes nothing.
+    /// The part of the change by `other` that neither this model's parameters nor up to `most` columns of `unnamed`
+    /// (greedily selected) can imitate. Blocks of `block` samples of the error count as independent. `None` if it
+    /// diverges or changes nothing.
     pub(crate) fn shown(
         &self,
         unnamed: &Unnamed,
@@ -236,7 +236,7 @@ mod tests {
         };
         let echo = left("echo-path", &[0.1, 0.142]);
         assert!(echo[1] > 0.02 && echo[2] < 1e-3, "{echo:?}");
-        // No lag of y acts before y moves.
+        // No lag of y has an effect before y moves.
         let pickup = left("electrical-pickup", &[0.1, 0.0]);
         assert!(pickup.len() == 5 && pickup[4] > 0.2, "{pickup:?}");
     }

@@ -256,7 +256,7 @@ impl Screen<'_> {
                 }
                 _ => true,
             };
-            // Time constants are kept all: which one matters beside an effect is not known yet.
+            // All time constants are kept, because it is not known yet which one matters together with an effect.
             let alike: Vec<&Candidate> = kept.iter().filter(same_kind).collect();
             let has_time = matches!(
                 candidate.term,

@@ -18,7 +18,7 @@ pub enum Term {
     Product(u16),
     /// A second first-order lag in series, time constant in samples: a flow of second order.
     Inertia(f64),
-    /// A rate of the flow that depends on its level; part of the base, no missing effect.
+    /// A level-dependent rate of the flow; part of the base, not a missing effect.
     LevelRate,
     /// A slow wake with this time constant (inner seconds): a memory of the flow.
     Wake(f64),
@@ -180,7 +180,7 @@ impl Term {
         match self {
             Self::Memory(lag) => format!("memory of {lag} samples"),
             Self::State(lag) => format!("lag of {lag} samples"),
-            Self::Product(lag) => format!("lag of {lag} samples under the jet"),
+            Self::Product(lag) => format!("lag of {lag} samples while the jet is on"),
             Self::Inertia(_) => "second order".to_owned(),
             Self::LevelRate => LEVEL_RATE.name.to_owned(),
             Self::Wake(_) => SLOW_WAKE.name.to_owned(),
@@ -353,7 +353,7 @@ impl Term {
         model
     }
 
-    /// The model with this term's lag moved to `lag`; `None` if it exists already or another term is.
+    /// The model with this term's lag moved to `lag`; `None` if another term has that lag.
     #[must_use]
     pub fn moved_in(&self, model: &Model, lag: u16) -> Option<Model> {
         let old = self.lag().filter(|old| *old != lag)?;
@@ -397,8 +397,8 @@ fn mean_delay(spec: &Spec, parameters: &[f64], period: f64) -> f64 {
 /// Samples after which a step response has settled.
 const PATH_SETTLED: usize = 4000;
 
-/// Gives a model the delay law of another one, shifted to the mean of its own: the other was fitted beside
-/// different terms.
+/// Gives a model the delay law of another one, shifted to the mean of its own law, because the other law was fitted
+/// with different terms.
 pub(super) fn take_delay_law(model: &mut Model, law: &Delay) {
     let level = |delay: &Delay| delay.present(RULES.middle, model.sample_period_s);
     let later = level(&model.delay) - level(law);
@@ -410,7 +410,7 @@ pub(super) fn take_delay_law(model: &mut Model, law: &Delay) {
 const NEWEST: u16 = 1;
 const BEFORE: u16 = 2;
 
-/// Adds a first-order lag of so many samples in series with the flow and shortens the delay accordingly.
+/// Adds a first-order lag of this many samples in series with the flow and shortens the delay accordingly.
 ///
 /// With z the present flow and y_k = (1 − α) y_{k−1} + α z_k, the terms of the newest lag become exactly
 /// those of two lags; slow memories are scaled by α.

@@ -128,7 +128,7 @@ impl Units {
                 let added = &mut model.effects[i];
                 added.parameters = self.scaled(spec, &added.parameters, inward);
                 if spec.calibrated {
-                    // A reference equal to the card's is not written.
+                    // A reference that equals the card's is not written.
                     let reference = added.reference() * y;
                     added.reference = Some(reference).filter(|r| (r - 1.0).abs() > 1e-9);
                 }
@@ -141,8 +141,7 @@ impl Units {
     #[must_use]
     pub fn model_in(&self, model: &Model) -> Model {
         let mut model = self.scale(&self.commanded_in(model), true);
-        // y of order one is friction with the calibration of the card; otherwise the size of y is the
-        // calibration.
+        // y of order one is friction with the calibration of the card; otherwise the calibration is the size of y.
         let of_order_one = (FIT.order_one_low..FIT.order_one_high).contains(&self.y);
         model.calibrated_at = of_order_one.then(|| 1.0 / self.y);
         self.move_zero(&mut model, -self.zero / self.y);
@@ -159,7 +158,7 @@ impl Units {
         model
     }
 
-    /// A model whose commands are fractions of a full jet: size and zero of other commands are moved into the
+    /// A model whose commands are fractions of a full jet: scale and offset of other commands are moved into the
     /// coefficients.
     fn commanded_in(&self, model: &Model) -> Model {
         let mut inner = model.clone();
@@ -167,7 +166,7 @@ impl Units {
         if model.command == self.command {
             return inner;
         }
-        // u = off + size·share, where u is a share of the model's own full jet.
+        // u = off + size·share, where u is a fraction of the model's own full jet.
         let off = model.command.share(self.command.off);
         let size = model.command.share(self.command.full) - off;
         let count = model.product_lags.len();
@@ -295,7 +294,7 @@ mod tests {
         }
     }
 
-    /// A film's calibration is the card's where y is friction, and scales with y in other units.
+    /// A film's calibration is the card's if y is friction, and scales with y in other units.
     #[test]
     fn king_s_law_keeps_what_it_was_calibrated_at() {
         let film = spec("hot-film-nonlinearity").unwrap();

@@ -84,7 +84,7 @@ impl Compiler {
         let tokens = TokenStream::from_str(text).map_err(|error| {
             Fault::at(
                 error.span(),
-                "this cannot be read as Rust; look for an unclosed bracket or quote",
+                "this is not valid Rust syntax; look for an unclosed bracket or quote",
             )
         })?;
         check_tokens(&tokens)?;
@@ -106,7 +106,7 @@ impl Compiler {
         let Some((last, before)) = statements.split_last() else {
             return Err(Fault::at(
                 place,
-                "there is no value here; write an expression",
+                "a value is missing here; write an expression",
             ));
         };
         for statement in before {
@@ -116,7 +116,7 @@ impl Compiler {
             Stmt::Expr(value, None) => self.value(value),
             Stmt::Expr(value, Some(_)) => Err(Fault::at(
                 value.span(),
-                "the last line is the value and has no semicolon",
+                "the last line is the value and must not end with a semicolon",
             )),
             Stmt::Local(local) => Err(Fault::at(
                 local.span(),
@@ -301,18 +301,17 @@ impl Compiler {
                 let place = |i: usize| arguments.get(i).map_or(span, |delay| delay.span());
                 let longest = longest.first().copied();
                 if longest.is_none() && !self.builder.is_once(delay) {
-                    let problem = "a delay of two arguments is the same at every sample: a number of \
-                         seconds, a parameter, or made of those and `period`; for one that changes, \
-                         say how long it can be: delayed(x, seconds, longest)";
+                    let problem = "a delay of two arguments must be constant: a number of seconds, a \
+                         parameter, or an expression of those and `period`; for a varying delay state its \
+                         longest value: delayed(x, seconds, longest)";
                     return Err(Fault::at(place(1), problem));
                 }
                 if longest.is_some_and(|longest| !self.builder.is_once(longest)) {
-                    let problem =
-                        "the longest delay is the same at every sample: a number of seconds";
+                    let problem = "the longest delay must be a constant number of seconds";
                     return Err(Fault::at(place(2), problem));
                 }
                 if self.builder.is_number(signal) {
-                    let problem = "a number does not change, so there is nothing to delay";
+                    let problem = "a number is constant, so it cannot be delayed";
                     return Err(Fault::at(span, problem));
                 }
                 let register = self.builder.delayed(signal, delay, longest);
@@ -351,7 +350,7 @@ impl Compiler {
                 .map(|(from, to)| (to - from, to as f32 > from as f32));
             let (Some((width, true)), Some(to)) = (width, to) else {
                 let place = arguments.get(2 * i + 3).map_or(span, |x| x.span());
-                let problem = "the places of a table are numbers, each above the one before";
+                let problem = "the positions of a table are numbers in ascending order";
                 return Err(Fault::at(place, problem));
             };
             let mut number = |op: Op| self.builder.push(op);
@@ -386,8 +385,8 @@ impl Compiler {
 }
 
 /// Syntax of a table.
-const TABLE: &str = "a table is written table(x, x1, v1, x2, v2, …): at least two points, the places \
-     numbers that rise";
+const TABLE: &str = "a table is written table(x, x1, v1, x2, v2, …): at least two points, with positions that \
+     are numbers in ascending order";
 
 fn binary_operator(op: &BinOp) -> Option<(Binary, Kind, Kind)> {
     use Kind::{Condition, Number};

@@ -37,7 +37,7 @@ enum Step {
 #[derive(Clone, Debug)]
 struct Table<T> {
     x: Register,
-    /// Positions beyond which a line counts in full.
+    /// Positions beyond which a line contributes its full height.
     ends: Vec<f64>,
     lines: Vec<TableLine<T>>,
     /// The value after the last point.
@@ -53,10 +53,10 @@ struct TableLine<T> {
     below: T,
 }
 
-/// Relative margin beyond the end of a line that single precision does not round back.
+/// Relative margin beyond the end of a line, so that rounding to single precision does not return into it.
 const ROUNDING: f64 = 1e-5;
 
-/// Position beyond which the line from `from` to `to` counts in full.
+/// Position beyond which the line from `from` to `to` contributes its full height.
 fn surely_passed(from: f64, to: f64) -> f64 {
     to + ROUNDING * (from.abs() + 2.0 * to.abs())
 }
@@ -267,7 +267,7 @@ impl<T: Real> UserEffect<T> {
                     Signal::Present => at.present,
                     Signal::Channel => {
                         let channel = at.channels.get(self.setting.channel);
-                        // An unconnected channel counts as at its reference.
+                        // Without a channel, its reference is used.
                         channel.copied().unwrap_or(self.setting.reference)
                     }
                     Signal::Time => clock.time(self.setting.period),

@@ -81,9 +81,8 @@ pub enum DefinitionError {
 
 /// A user's own effect, checked and compiled.
 ///
-/// Definitions live as long as the program: catalogue entries are `'static`,
-/// and so that the rest of the tool needs one kind of them only, a definition's
-/// memory is never given back. Equal definitions share it.
+/// Definitions live as long as the program, because catalogue entries are `'static` and the rest of the tool then
+/// needs one kind only. The memory of a definition is never freed; equal definitions share it.
 #[derive(Debug)]
 pub struct Definition {
     source: Source,
@@ -140,7 +139,7 @@ impl Definition {
         })
     }
 
-    /// Checks and compiles; `prefix` comes before the keys in errors.
+    /// Checks and compiles; `prefix` is put before the keys in errors.
     pub(crate) fn from_source(
         source: Source,
         place: &str,
@@ -175,7 +174,7 @@ impl Definition {
         self.source.scales
     }
 
-    /// Whether it is an input that was measured beside the command.
+    /// Whether it is a measured input.
     pub(crate) fn is_measured_input(&self) -> bool {
         self.scales() && self.spec.channel.is_some()
     }
@@ -205,7 +204,7 @@ fn read(text: &str, place: &str) -> Result<Source, DefinitionError> {
     })
 }
 
-/// The program of an effect; `prefix` comes before the keys in errors.
+/// The program of an effect; `prefix` is put before the keys in errors.
 fn compiled(source: &Source, place: &str, prefix: &str) -> Result<Program, DefinitionError> {
     source.compile().map_err(|refusal| match refusal {
         Refusal::Key(key, problem) => DefinitionError::Key {
@@ -617,7 +616,7 @@ update = "reading"
             ("gain * !y", 9, "a condition is needed"),
             ("gain < y < u", 1, "Rust's grammar says"),
             ("gain +", 1, "Rust's grammar says"),
-            ("", 1, "there is no value here"),
+            ("", 1, "a value is missing here"),
         ] {
             let text = refusal(expression);
             assert!(

@@ -1,5 +1,5 @@
-//! An expression as a list of operations, used by the interpreter and by Rust generation, so that both
-//! compute the same in the same order.
+//! An expression as a list of operations. The interpreter and the generated Rust use it, so both compute the same
+//! operations in the same order.
 
 use model_core::Real;
 use std::cmp::Ordering;
@@ -20,11 +20,11 @@ pub(crate) enum Signal {
     Arrived,
     /// 1 − Σa − Σc·j of the recursion.
     Relaxation,
-    /// The flow one sample before; like the next three, for effects of the catalogue only.
+    /// The flow one sample before; this and the next three are for effects of the catalogue only.
     Before,
     /// The flow at the next sample without this effect.
     Next,
-    /// The separated flow's share of the motion.
+    /// Share of the separated flow in the motion.
     Released,
     /// The jet strength at the flow at this instant.
     Present,
@@ -303,7 +303,7 @@ impl Builder {
         self.number(register).is_some()
     }
 
-    /// Removes operations without influence on `value`, and renumbers the rest.
+    /// Removes operations that do not influence `value`, and renumbers the others.
     pub(crate) fn finish(self, value: Register, states: Vec<Carried>) -> Program {
         let mut alive = vec![false; self.ops.len()];
         let mut pending = vec![value];

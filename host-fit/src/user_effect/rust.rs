@@ -591,7 +591,7 @@ fn named_if_used(name: &str, body: &TokenStream) -> Ident {
         let mut before = None;
         body.clone().into_iter().any(|token| {
             let found = match &token {
-                // A field of that name is something else.
+                // A field of that name has another meaning.
                 TokenTree::Ident(ident) => ident == name && before != Some('.'),
                 TokenTree::Group(group) => uses(&group.stream(), name),
                 _ => false,

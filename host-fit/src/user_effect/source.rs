@@ -17,7 +17,7 @@ pub(crate) struct Source {
     reference: Option<String>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     channel: Option<String>,
-    /// Whether no number in its expressions has a unit of y or time, so that it also holds in other units.
+    /// Whether no number in its expressions has a unit of y or time, so that it is also valid in other units.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub(super) scales: bool,
     expression: String,
@@ -70,7 +70,7 @@ fn is_identifier(name: &str) -> bool {
         && syn::parse_str::<syn::Ident>(name).is_ok()
 }
 
-/// The name of a channel in expressions: its own, or `channel` where that is no name of the language.
+/// The name of a channel in expressions: its own, or `channel` if that is not a name of the language.
 pub(crate) fn channel_signal(channel: &str) -> &str {
     if is_identifier(channel) {
         channel
@@ -118,7 +118,7 @@ impl Source {
             return key("name", problem);
         }
         if self.summary.trim().is_empty() || self.summary.contains(['\n', '\r']) {
-            return key("summary", "say in one line what the effect is".to_owned());
+            return key("summary", "describe the effect in one line".to_owned());
         }
         let mut compiler = Compiler::default();
         let mut signals = vec![
@@ -172,7 +172,7 @@ impl Source {
             let label = format!("state.{}", state.name);
             name(label.clone(), &state.name, Op::State(index))?;
             if !(state.start as f32).is_finite() {
-                return key(&label, "`start` is no finite number".to_owned());
+                return key(&label, "`start` is not a finite number".to_owned());
             }
         }
         let mut states = Vec::with_capacity(self.state.len());
@@ -273,7 +273,7 @@ impl SourceParameter {
     fn check(&self) -> Result<(), String> {
         let finite = |value: &f64| (*value as f32).is_finite();
         if !(finite(&self.low) && finite(&self.high) && self.low < self.high) {
-            return Err("`low` and `high` are finite, and `low` is below `high`".to_owned());
+            return Err("`low` and `high` must be finite, and `low` below `high`".to_owned());
         }
         if self.starts.is_empty()
             || !self
@@ -286,7 +286,7 @@ impl SourceParameter {
             );
         }
         if self.unit.trim().is_empty() || self.unit.contains(['\n', '\r']) {
-            return Err("`unit` is a unit in words, `-` for none".to_owned());
+            return Err("`unit` must be a unit in words, or `-` for none".to_owned());
         }
         Ok(())
     }

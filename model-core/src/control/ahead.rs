@@ -18,7 +18,7 @@ pub struct Ahead<'a, T, P, const A: usize> {
 }
 
 impl<T: Real, P: Past<T>, const A: usize> Ahead<'_, T, P, A> {
-    /// Appends a predicted sample; ignored when the room is used up.
+    /// Appends a predicted sample; ignored if the memory is full.
     #[inline(always)]
     fn push(&mut self, value: T) {
         if let Some(slot) = self.ahead.get_mut(self.filled) {
@@ -97,10 +97,10 @@ impl<T: Real> Default for Foreknown<T> {
 /// Runs `model` from `state` under `input` until `enough` returns true, for at most as many samples as there
 /// is `room`.
 ///
-/// `enough` receives each sample ahead: its number from 0, the predicted flow (without sensor effects, which
-/// may cost more than the rest), and whether an input issued now has arrived. `foreknown` belongs to `state`
-/// and must be advanced by this function at every sample. The prediction equals that of [`step`](crate::step)
-/// up to the last digits. Costs at most a model step per sample ahead; only the jets' past is copied.
+/// `enough` receives each predicted sample: its number from 0, the predicted flow (without sensor effects, which
+/// may cost more than the rest), and whether an input issued now has arrived. `foreknown` belongs to `state` and
+/// must be advanced by this function at every sample. The prediction equals that of [`step`](crate::step) up to the
+/// last digits. It costs at most one model step per predicted sample; only the past of the jets is copied.
 #[inline(always)]
 pub fn run<T, M, Y, J, const A: usize>(
     model: &M,
@@ -137,7 +137,7 @@ pub fn run<T, M, Y, J, const A: usize>(
             Some(known) if i < NEAR => *known,
             _ => recursion.known(&ahead.outputs, NEAR, 0),
         };
-        // i + 1 inputs have been issued ahead: a delay of up to i reads one of them.
+        // i + 1 inputs have been issued ahead; a delay of up to i samples reads one of them.
         let within = if arrived { 0 } else { i };
         let known = (&known, NEAR);
         let (output, delay) =
@@ -161,8 +161,7 @@ mod tests {
     use crate::model::{Averaging, Params, matrix, step, vector};
     use crate::recursion::{Grading, LagConvention};
 
-    /// Covers effects with memory, a varying delay, lags on both sides of the cache, and look-aheads beyond
-    /// it.
+    /// Covers effects with memory, a varying delay, lags on both sides of the cache, and predictions beyond it.
     #[test]
     fn it_foresees_what_the_model_does() {
         let setting = Setting {

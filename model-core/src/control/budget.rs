@@ -1,6 +1,6 @@
 //! Budgets of valve and compressor: switches and air per time.
 //!
-//! Both are stores with a constant inflow, in whole numbers, so that they neither drift nor round.
+//! Both are stores with a constant inflow, in whole numbers, so they have neither drift nor rounding errors.
 
 use crate::control::hold::{Hold, HoldTimes};
 
@@ -18,7 +18,7 @@ pub struct Switches {
 pub struct Air {
     /// Allowed long-run share of time with the valve open, in 1/1000; 1000 is no limit.
     pub per_mille: u32,
-    /// Samples of continuous blowing that a full store of air gives beyond the allowed share.
+    /// Samples of continuous blowing beyond the allowed share that a full store of air permits.
     pub saved: u32,
 }
 

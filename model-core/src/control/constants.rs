@@ -12,7 +12,7 @@ pub struct Tracking<T> {
     pub reference: T,
     /// Reachable references.
     pub reachable: Reachable<T>,
-    /// Fastest change of the reference, y per sample; 0 follows steps as steps.
+    /// Fastest change of the reference, y per sample; 0 follows steps without a ramp.
     pub slope: T,
     /// Shortest on and off times.
     pub hold: HoldTimes,
@@ -20,9 +20,9 @@ pub struct Tracking<T> {
     pub budget: Budget,
     /// Prediction horizon of the bias estimate, at least 1 and at most the shortest delay.
     pub lead: u16,
-    /// From an opening command to half the jet strength (valve, edge delays).
+    /// Samples from an opening command to half the jet strength (valve, edge delays).
     pub opening: u16,
-    /// From a closing command to half the jet strength.
+    /// Samples from a closing command to half the jet strength.
     pub closing: u16,
     /// Share of each residual that corrects the estimate, 0–1: 0 trusts the
     /// model alone, 1 the sensor alone.
@@ -40,7 +40,7 @@ pub struct Tracking<T> {
     pub settled: T,
     /// Limit of bias and integral, y.
     pub correction_limit: T,
-    /// Limit of a residual, y: a single outlier does no harm.
+    /// Limit of a residual, y, which bounds the influence of a single outlier.
     pub residual_limit: T,
 }
 
@@ -50,8 +50,7 @@ pub struct Tracking<T> {
 pub enum Unusable {
     /// A share or rate is not within 0–1, or a limit is negative or not finite.
     Constant(&'static str),
-    /// The look-ahead memory has fewer samples than the delay, valve and half a
-    /// hold time together.
+    /// The memory for predictions has fewer samples than the delay, valve and half a hold time together.
     LookAhead,
     /// Tracking needs the full model; an averaged model (eq. 15) does not resolve single switches.
     AveragedModel,
@@ -62,8 +61,8 @@ impl fmt::Display for Unusable {
         match self {
             Self::Constant(name) => write!(f, "`{name}` of the tracking law is out of range"),
             Self::LookAhead => f.write_str(
-                "delay, valve and half a hold time together are more samples than the law can look ahead; \
-                 take shorter hold times, or a model with a longer sample period",
+                "the law looks ahead over delay, valve and half a hold time, which is more samples than it can \
+                 store; use shorter hold times, or a model with a longer sample period",
             ),
             Self::AveragedModel => f.write_str(
                 "the tracking law needs a full model; identify without averaging",

@@ -23,7 +23,7 @@ pub(crate) struct Correction<T, const A: usize> {
     age: u32,
     /// Rate of the integral relative to its first.
     share: T,
-    /// Reference for which the integral was learned.
+    /// Reference for which the integral was determined.
     reference: T,
 }
 
@@ -79,11 +79,12 @@ impl<T: Real, const A: usize> Correction<T, A> {
             .at_least(self.missed - law.play)
             .at_most(self.missed + law.play);
         if bias != self.bias {
-            // The model error has changed: the integral rate is reset too.
+            // The model error has changed, so the integral rate is reset too.
             self.bias = bias;
             self.share = T::ONE;
         }
-        // Anti-windup: the integral stops while the valve stays where the integral drives it.
+        // Anti-windup: the integral stops while the valve already is in the position towards which the integral
+        // drives it.
         let error = reference - flow;
         let pushes_on = error > T::ZERO;
         let still = since >= 4 * u32::from(law.lead);
@@ -133,7 +134,7 @@ mod tests {
         residual_limit: 1.0,
     };
 
-    /// Predictions that are 0.1 too low, for a flow at 0.6 with the reference 0.5.
+    /// Predictions that are 0.1 too low: the flow is at 0.6 with the reference 0.5.
     fn after(samples: u32, since: u32, on: bool) -> Correction<f64, 8> {
         let mut correction = Correction::none();
         for _ in 0..samples {
@@ -153,12 +154,13 @@ mod tests {
     fn the_integral_grows_to_its_limit_and_waits_for_a_valve_that_can_give_no_more() {
         assert!((after(13, 0, false).integral + 0.01).abs() < 1e-12);
         assert_eq!(after(1000, 0, false).integral, -0.3);
-        // Too much flow with the valve closed for long: the integral stops; with the valve open it does not.
+        // Too much flow after a long time with the valve closed: the integral stops. With the valve open it does
+        // not.
         assert_eq!(after(1000, 12, false).integral, 0.0);
         assert_eq!(after(1000, 12, true).integral, -0.3);
     }
 
-    /// The relative integral rate after so many samples of a prediction error `missed` with a ripple of 0.01.
+    /// The relative integral rate after this many samples of a prediction error `missed` with a ripple of 0.01.
     fn learnt(law: &Tracking<f64>, samples: u32, missed: f64) -> Correction<f64, 8> {
         let mut correction = Correction::none();
         for k in 0..samples {
@@ -178,7 +180,7 @@ mod tests {
         };
         let quiet = learnt(&law, 3000, 0.0);
         assert_eq!(quiet.bias, 0.0);
-        // Riccati: decreases to the final rate and not below.
+        // Riccati: it decreases to the final rate and not further.
         assert!((quiet.share - 0.2).abs() < 0.005, "{}", quiet.share);
         // A changed model error moves the bias beyond its dead band, and resets the integral rate.
         let mut wrong = quiet;

@@ -1,4 +1,4 @@
-//! Golden runs of the laws: bit-exact comparison of board and host.
+//! Reference runs of the laws: bit-exact comparison of board and host.
 
 use crate::control::constants::Tracking;
 use crate::control::pulses::{Played, Pulses};
@@ -8,7 +8,7 @@ use crate::history::Memory;
 use crate::model::{Parts, StateOf};
 use crate::self_test::{Crc32, command};
 
-/// Expected decisions of a law in the golden run.
+/// Expected decisions of a law in the reference run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct GoldenLaw {
     /// Length of the run, samples.
@@ -20,8 +20,8 @@ pub struct GoldenLaw {
 /// Runs `law` from `state` and returns the CRC-32 of its decisions, or `None` if one of its numbers was not
 /// finite.
 ///
-/// The law reads its own estimate with disturbances: ±1/8 of the residual limit following the golden command,
-/// occasional outliers beyond the limit, and no reading for a sixteenth of the time.
+/// The law reads its own estimate with disturbances: ±1/8 of the residual limit with the sign of the reference
+/// command, occasional outliers beyond the limit, and no reading for a sixteenth of the time.
 pub fn run<M, Y, J, const A: usize>(
     law: &Tracking<f32>,
     model: &M,
@@ -57,7 +57,7 @@ where
     Some(crc.value())
 }
 
-/// Plays `pulses` for so many samples and returns the CRC-32 of the valve positions.
+/// Plays `pulses` for this many samples and returns the CRC-32 of the valve positions.
 pub fn play<P: AsRef<[(u32, u32)]>>(pulses: &Pulses<P>, samples: u32) -> u32 {
     let mut played = Played::new();
     let valve = (0..samples).map(|_| pulses.step(&mut played));

@@ -36,7 +36,7 @@ pub struct Hold {
 }
 
 impl Hold {
-    /// A valve that has been closed for long and may open at once.
+    /// A valve that has been closed for a long time and may open at once.
     #[must_use]
     pub const fn closed() -> Self {
         Self {
@@ -52,7 +52,7 @@ impl Hold {
         self.on
     }
 
-    /// How long it has been in its position, samples; saturates at `u32::MAX`.
+    /// Time in its position, samples; saturates at `u32::MAX`.
     #[inline]
     #[must_use]
     pub const fn since(&self) -> u32 {

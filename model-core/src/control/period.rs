@@ -1,14 +1,14 @@
 //! Loop periods and times in samples.
 //!
-//! Times are stated in seconds (shortest times of a valve, timeouts) and converted to samples here, on host
-//! and board alike.
+//! Times are stated in seconds (shortest times of a valve, timeouts) and converted to samples here, for host and
+//! board alike.
 
-/// Shortest loop period that laws and boards are made for, µs.
+/// Shortest supported loop period of laws and boards, µs.
 pub const SHORTEST_US: u32 = 200;
-/// Longest loop period that laws and boards are made for, µs.
+/// Longest supported loop period of laws and boards, µs.
 pub const LONGEST_US: u32 = 100_000;
 
-/// A period in whole microseconds, the nearest: what the boards' timers count. `None` outside of
+/// The nearest period in whole microseconds, which is the unit of the boards' timers. `None` outside of
 /// [`SHORTEST_US`] to [`LONGEST_US`].
 ///
 /// ```
@@ -29,8 +29,8 @@ pub const fn loop_period_us(period_s: f64) -> Option<u32> {
     }
 }
 
-/// The fewest samples that last at least `time_s`: rounded up, and at least 1. An excess of a thousandth of a sample is
-/// the rounding of a printed time, or of an `f32`, and is no further sample.
+/// The fewest samples that last at least `time_s`: rounded up, and at least 1. An excess of up to a thousandth of a
+/// sample counts as rounding of a printed time, or of an `f32`.
 ///
 /// ```
 /// use model_core::control::period::samples_at_least;

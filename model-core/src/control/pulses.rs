@@ -1,8 +1,8 @@
-//! Periodic on/off commands: what the maximising law plays.
+//! Periodic on/off commands of the maximising law.
 
 use crate::control::hold::{Hold, HoldTimes};
 
-/// `N` pulses in a period that repeats for ever.
+/// `N` pulses in a period that repeats endlessly.
 ///
 /// ```
 /// use model_core::control::PulseTrain;
@@ -15,8 +15,7 @@ use crate::control::hold::{Hold, HoldTimes};
 pub struct PulseTrain<P> {
     /// Length of the period, samples, at least 1.
     pub period: u32,
-    /// (first sample, length) of each pulse in samples; a pulse may run over the
-    /// end of the period.
+    /// (first sample, length) of each pulse in samples; a pulse may extend beyond the end of the period.
     pub pulses: P,
 }
 
@@ -51,7 +50,7 @@ impl<P: AsRef<[(u32, u32)]>> PulseTrain<P> {
     }
 }
 
-/// A pulse train with hold times, as a board plays it.
+/// A pulse train with hold times, as played on a board.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Pulses<P> {
     /// The requested train.
@@ -68,7 +67,7 @@ pub struct Played {
 }
 
 impl Played {
-    /// The start of the period, with the valve closed for long.
+    /// The start of the period, with the valve closed for a long time.
     #[must_use]
     pub const fn new() -> Self {
         Self {

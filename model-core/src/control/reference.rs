@@ -4,8 +4,8 @@ use crate::real::Real;
 use crate::recursion::Bilinear;
 use core::fmt;
 
-/// The friction that on/off blowing can hold: above the level without jets, below that of steady blowing. In
-/// y, of the flow itself (before sensor effects).
+/// The friction that on/off blowing can hold: above the level without jets and below that of steady blowing. In y,
+/// of the flow itself (before sensor effects).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reachable<T> {
     /// Friction without jets; 0 in the paper.
@@ -27,7 +27,8 @@ impl fmt::Display for Unreachable {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "the reference {} cannot be held: on/off blowing reaches the open interval ({:.4}, {:.4}); choose a reference inside it",
+            "the reference {} cannot be held: the levels that on/off blowing can hold lie between {:.4} and \
+                 {:.4}; choose a reference inside",
             self.reference, self.reachable.low, self.reachable.high
         )
     }

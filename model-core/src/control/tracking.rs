@@ -1,11 +1,11 @@
 //! The tracking law: holds the friction at a reference with an on/off valve.
 //!
-//! A command issued at sample k arrives at κ(k) = min{m ≥ k : m − h(ỹ_m) ≥ k}. The law predicts the flow with
-//! the model from its present estimate through everything already issued up to that sample, with the delay
-//! evaluated at each sample, and then half a hold time further with the *other* valve position. It switches
-//! if the flow would then be on the other side of the reference: the ripple that a hold time causes is
-//! centred on the reference. At a hold time of one sample this is the one-step-optimal choice u = 1 ⇔ y* − F
-//! > G/2.
+//! A command issued at sample k arrives at κ(k) = min{m ≥ k : m − h(ỹ_m) ≥ k}. The law predicts the flow with the
+//! model from its present estimate. The prediction contains every command already issued up to κ(k), with the delay
+//! evaluated at each sample, and continues half a hold time further with the *other* valve position. The law
+//! switches if the flow would then be on the other side of the reference. The ripple that a hold time causes is
+//! thereby centred on the reference. At a hold time of one sample this is the one-step-optimal choice u = 1 ⇔ y* −
+//! F > G/2.
 //!
 //! Three corrections handle model errors: an observer corrects the estimate by a share of each residual, and
 //! bias and integral correct the reference.
@@ -72,7 +72,7 @@ impl<T: Real> Tracking<T> {
     /// Checks the constants for `model` and a look-ahead memory of `A` samples.
     ///
     /// # Errors
-    /// [`Unusable`] names what is wrong.
+    /// [`Unusable`] names the problem.
     pub fn validate<M: Parts<T>, const A: usize>(
         &self,
         model: &M,
@@ -130,17 +130,17 @@ impl<T: Real> Tracking<T> {
     /// Changes the reference.
     ///
     /// # Errors
-    /// [`Unreachable`], and the reference stays as it was.
+    /// [`Unreachable`]; the reference then stays unchanged.
     pub fn set_reference(&mut self, reference: T) -> Result<(), Unreachable> {
         self.reachable.check(reference)?;
         self.reference = reference;
         Ok(())
     }
 
-    /// Changes the air budget, 1 to 1000 thousandths of the time; the store of a budget that is new starts empty.
+    /// Changes the air budget, 1 to 1000 thousandths of the time; the store of a new budget starts empty.
     ///
     /// # Errors
-    /// [`Unusable`], and the budget stays as it was.
+    /// [`Unusable`]; the budget then stays unchanged.
     pub fn set_air(&mut self, per_mille: u32) -> Result<(), Unusable> {
         if !(1..=1000).contains(&per_mille) {
             return Err(Unusable::Constant("air"));
@@ -152,9 +152,9 @@ impl<T: Real> Tracking<T> {
         Ok(())
     }
 
-    /// One sample: decides the valve's position from everything known before it (nothing at the first sample,
-    /// so the valve stays closed), then takes the reading. A reading therefore acts one sample later, and the
-    /// decision does not wait for the converter.
+    /// One sample: decides on the valve's position with the readings before it, then accepts the present reading.
+    /// At the first sample there is no earlier reading, and the valve stays closed. A reading therefore acts one
+    /// sample later, and the decision does not wait for the converter.
     ///
     /// Costs at most `A` + 1 model steps, of N1 + N3·(N2 + 1) multiply–adds each.
     pub fn step<M, Y, J, const A: usize>(
@@ -174,7 +174,7 @@ impl<T: Real> Tracking<T> {
         let was_on = state.hold.is_on();
         let target = state.reference + state.correction.integral - state.correction.bias;
         let may_switch = state.hold.may_switch(&self.hold);
-        // At the first sample the cache is filled, which costs as much as a look-ahead; no decision is made.
+        // At the first sample the cache is filled, which costs as much as a prediction; no decision is made.
         let looks = !state
             .foreknown
             .begin(&model.recursion(), &state.model.outputs);
@@ -405,9 +405,9 @@ mod tests {
         }
     }
 
-    /// Theory 3.2, hold times of 10 samples: a predicting relay gives rms .012 and
-    /// .025 at 0.5, .016 and .028 at 0.8, .016 and .035 at 0.95 (literal and
-    /// one-step lags). Centring the swing on the reference does better.
+    /// Theory 3.2, hold times of 10 samples: a predicting relay gives rms .012 and .025 at 0.5, .016 and .028 at
+    /// 0.8, .016 and .035 at 0.95 (literal and one-step lags). Centring the ripple on the reference reduces these
+    /// errors.
     #[test]
     fn the_papers_model_is_held_more_closely_than_by_a_predicting_relay() {
         let literal = [(0.5, 0.012), (0.8, 0.016), (0.95, 0.016)];
@@ -506,7 +506,7 @@ mod tests {
         let mut law = law::<f64>(0.9, 10);
         assert!(law.set_reference(1.2).is_err());
         assert_eq!(law.reference, 0.9);
-        // Above the reachable interval the valve stays open and nothing winds up.
+        // Above the reachable interval the valve stays open, and no integrator winds up.
         law.reference = 1.5;
         let (mut back_at, mut last) = (None, 0.0);
         on_its_model(LagConvention::OneStep, law, 9000, |k, y, law, decision| {
@@ -522,8 +522,7 @@ mod tests {
             last = y;
             None
         });
-        // Falling from 1.05 to 0.5 on 0.6 s takes the model 0.4 s; the valve
-        // closes at once.
+        // The model needs 0.4 s to fall from 1.05 to 0.5, and the valve closes at once.
         assert!(back_at.is_some_and(|k| k < 700), "{back_at:?}");
         assert!((last - 0.5).abs() < 0.05);
     }

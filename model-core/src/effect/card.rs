@@ -53,7 +53,7 @@ pub struct Parameter {
     pub influence: Influence,
     /// Its physically possible sign.
     pub sign: Sign,
-    /// Its value where a model file does not have it; `None` if a file must have it.
+    /// Its value if a model file does not contain it; `None` if it is required.
     pub left_out: Option<f64>,
 }
 
@@ -127,7 +127,7 @@ impl Parameter {
 /// Facts about records and model, for ranges and starting values.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Facts<'a> {
-    /// Size of y; 1 for signals of order 1, which cards are written for.
+    /// Size of y; 1 for signals of order 1, for which cards are written.
     pub y: f64,
     /// Size of u; 1 for on/off commands.
     pub u: f64,
@@ -163,7 +163,7 @@ pub enum StartValue {
     Number(f64),
     /// The quantile of y at this fraction.
     Quantile(f64),
-    /// The present delay plus so many samples.
+    /// The present delay plus this many samples.
     Delay(f64),
     /// This multiple of the flow's time constant.
     TimeConstants(f64),
@@ -210,11 +210,11 @@ pub enum Needs {
     Nothing,
     /// An input with more than two levels.
     GradedInput,
-    /// A flow that answers the command later than the sensor.
+    /// A dead time that is longer than that of the sensor.
     DeadTime,
 }
 
-/// Dead time, in samples, up to which the answer of the flow is taken for one of the sensor.
+/// Dead time, in samples, up to which a response of the flow could be one of the sensor.
 const AT_ONCE: f64 = 2.0;
 
 impl Needs {
@@ -222,12 +222,12 @@ impl Needs {
     #[must_use]
     pub fn unmet(self, on_off: bool, dead_time: f64) -> Option<&'static str> {
         match self {
-            Self::DeadTime if dead_time <= AT_ONCE => {
-                Some("the flow answers the command within two samples, as the sensor does")
-            }
-            Self::GradedInput if on_off => {
-                Some("the input has two levels only, which any static curve maps on two")
-            }
+            Self::DeadTime if dead_time <= AT_ONCE => Some(
+                "the flow responds to the command within two samples, as fast as a pickup would",
+            ),
+            Self::GradedInput if on_off => Some(
+                "the input has two levels only, and every static curve maps two levels to two levels",
+            ),
             _ => None,
         }
     }
@@ -241,13 +241,14 @@ pub type Said = fn(&[f64]) -> (f64, &'static str);
 pub struct Amplitude {
     /// The parameter's name.
     pub parameter: &'static str,
-    /// The effect in a phrase: "a lag of the valve" (above 3 ms would have been detected).
+    /// The effect in a phrase, for example "a lag of the valve" in "a lag of the valve above 3 ms would have been
+    /// detected".
     pub words: &'static str,
-    /// Whether the effect's contribution is proportional to it, other parameters constant.
+    /// Whether the effect's contribution is proportional to it for constant other parameters.
     pub linear: bool,
     /// Whether all other parameters vanish with it.
     pub together: bool,
-    /// A more intuitive number than the parameter; none: the parameter [as spoken](Unit::spoken).
+    /// A more intuitive number than the parameter; `None` for the parameter [as spoken](Unit::spoken).
     pub said: Option<Said>,
 }
 
@@ -273,7 +274,7 @@ impl Amplitude {
         }
     }
 
-    /// The same where all parameters vanish together.
+    /// The same, if all parameters vanish together.
     #[must_use]
     pub const fn together(self) -> Self {
         Self {
@@ -317,7 +318,7 @@ pub struct LawCard {
 }
 
 impl LawCard {
-    /// A law that does not shape the command; without its words.
+    /// A law that does not change the command; without its words.
     pub const PLAIN: Self = Self {
         words: "",
         shapes_command: false,
@@ -346,7 +347,7 @@ pub struct Spec {
     pub starts: Starts,
     /// Its amplitude parameter, if it has one.
     pub amplitude: Option<Amplitude>,
-    /// The measured channel it needs besides u and y.
+    /// The measured channel it needs in addition to u and y.
     pub channel: Option<&'static str>,
     /// Whether the reference of its setting is the calibration reading of the sensor, y > 0; 1 by default.
     pub calibrated: bool,
@@ -354,7 +355,8 @@ pub struct Spec {
     pub needs: Needs,
     /// Whether it is a base term, which is never reported as missing: a constant delay, the sensor's offset.
     pub base: bool,
-    /// Whether a second lag of the flow has the same output, whatever the command: the two are always stated together.
+    /// Whether a second lag of the flow has the same output for every command: the two are then always stated
+    /// together.
     pub lag_in_series: bool,
     /// Whether it opposes or scales a motion: it is applied after all driving effects.
     pub resists: bool,
@@ -365,8 +367,8 @@ pub struct Spec {
 }
 
 impl Spec {
-    /// Defaults of a card: number parameters, starts on a grid, no requirements. An effect's card overrides
-    /// what differs.
+    /// Defaults of a card: number parameters, starting values on a grid, no requirements. An effect's card
+    /// overrides them.
     pub const PLAIN: Self = Self {
         name: "",
         rust: "",

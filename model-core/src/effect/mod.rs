@@ -135,7 +135,7 @@ impl<T: Real> Effect<T> for () {
     fn start(&self) {}
 }
 
-/// Two effects, one after the other; nest pairs for more.
+/// Two effects, one after the other; nested pairs hold more.
 impl<T: Real, A: Effect<T>, B: Effect<T>> Effect<T> for (A, B) {
     type State = (A::State, B::State);
 

@@ -51,7 +51,7 @@ const SYMBOLS: [(Unit, &str); 12] = [
 ];
 
 impl Unit {
-    /// The unit in words, as files and reports have it; "-" for a ratio.
+    /// The unit in words, as in files and reports; "-" for a ratio.
     #[must_use]
     pub fn symbol(self) -> &'static str {
         if let Self::Other(words) = self {
@@ -68,8 +68,8 @@ impl Unit {
         known.map_or(Self::Other(symbol), |(unit, _)| *unit)
     }
 
-    /// Conversion factor of a value in this unit when y is multiplied by `y`, times by `time` (samples stay)
-    /// and u by `u`.
+    /// Conversion factor of a value in this unit if y is multiplied by `y`, times by `time` (samples stay) and u by
+    /// `u`.
     #[must_use]
     pub fn scale(self, y: f64, time: f64, u: f64) -> f64 {
         match self {
@@ -84,7 +84,7 @@ impl Unit {
         }
     }
 
-    /// `value` with its unit as spoken in a report.
+    /// `value` with its unit, in the form used in reports.
     #[must_use]
     pub fn spoken(self, value: f64) -> (f64, &'static str) {
         match self {

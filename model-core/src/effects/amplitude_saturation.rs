@@ -29,8 +29,8 @@ impl<T: Real> Physics<T> for AmplitudeSaturation<T> {
         name: "amplitude-saturation",
         rust: "amplitude_saturation::AmplitudeSaturation",
         place: Place::Flow,
-        summary: "growth saturates (or stiffens) with amplitude",
-        equation: "adds −γ·s³ to the drive",
+        summary: "the growth rate of the flow saturates (or increases) with the amplitude",
+        equation: "−γ·s³ is added to the drive",
         parameters: &[
             Parameter::new("cubic", Unit::PerYSquared, [-1000.0, 1000.0], &[0.1]).positive(),
         ],

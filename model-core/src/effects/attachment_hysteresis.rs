@@ -44,8 +44,8 @@ impl<T: Real> Physics<T> for AttachmentHysteresis<T> {
         name: "attachment-hysteresis",
         rust: "attachment_hysteresis::AttachmentHysteresis",
         place: Place::Flow,
-        summary: "attachment has memory: it lets go later than it takes hold",
-        equation: "relay r: 0→1 when s > θ_hi, 1→0 when s < θ_lo; adds g·r to the drive",
+        summary: "the flow has two states: it attaches at a higher level of y than it separates at",
+        equation: "relay r switches 0→1 at s > θ_hi and 1→0 at s < θ_lo; g·r is added to the drive",
         parameters: &[
             Parameter::new("upper_threshold", Unit::Y, [-0.5, 2.0], &[0.4, 0.6, 0.8]).stepwise(),
             Parameter::new("lower_threshold", Unit::Y, [-0.5, 2.0], &[0.15, 0.35]).stepwise(),
@@ -79,7 +79,8 @@ mod tests {
         assert!((s[1199] - 0.9).abs() < 1e-4, "{}", s[1199]);
         assert!((s[1999] - 0.65).abs() < 1e-4, "{}", s[1999]);
         let s = flow(&relay, |k| if k < 800 { 0.7 } else { 0.0 });
-        // Attached at a target of 0 the equilibrium is the gain: the flow detaches below the lower threshold.
+        // With a target of 0 the equilibrium of the attached flow is the gain: the flow detaches below the lower
+        // threshold.
         assert!(s[1999].abs() < 1e-4, "{}", s[1999]);
     }
 }

@@ -118,7 +118,7 @@ fn effects() -> impl Iterator<Item = &'static Spec> {
     SPECS.iter().filter(|spec| spec.place != Place::Delay)
 }
 
-/// A chain on the host calls an effect at the place on its card only.
+/// A chain on the host calls an effect only at the place on its card.
 #[test]
 fn an_effect_acts_at_the_place_on_its_card_only() {
     let flow = Flow {

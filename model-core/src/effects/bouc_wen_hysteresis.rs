@@ -28,7 +28,7 @@ impl<T: Real> Effect<T> for BoucWenHysteresis<T> {
     #[inline(always)]
     fn drive(&self, z: &mut T, flow: &Flow<T>, _at: &Instant<'_, T>) -> T {
         let change = flow.now - flow.before;
-        // Implicit in z where the loop closes: stable for any change.
+        // Implicit in z where the loop closes, so it is stable for any change.
         let closing = self.beta * change.abs();
         let opening = self.gamma * change;
         *z = (*z + self.stiffness * change - opening * z.abs()) / (T::ONE + closing.abs());
@@ -36,7 +36,7 @@ impl<T: Real> Effect<T> for BoucWenHysteresis<T> {
     }
 }
 
-/// α is reported alone, because the share of its factor depends on the loop.
+/// α is reported alone, because its factor's share depends on the loop.
 fn alpha(parameters: &[f64]) -> (f64, &'static str) {
     let [_, _, _, alpha] = take(parameters);
     (alpha, "(alpha)")
@@ -47,8 +47,8 @@ impl<T: Real> Physics<T> for BoucWenHysteresis<T> {
         name: "bouc-wen-hysteresis",
         rust: "bouc_wen_hysteresis::BoucWenHysteresis",
         place: Place::Flow,
-        summary: "a smooth hysteresis loop in the restoring force",
-        equation: "ż = A·ṡ − β·|ṡ|·z − γ·ṡ·|z|; adds −α·z",
+        summary: "the restoring force has a smooth hysteresis loop",
+        equation: "ż = A·ṡ − β·|ṡ|·z − γ·ṡ·|z|; −α·z is added to the drive",
         parameters: &[
             Parameter::new("stiffness", Unit::None, [1.0, 1.0], &[1.0]),
             Parameter::new("beta", Unit::PerY, [0.01, 1000.0], &[2.0, 10.0]),
@@ -109,7 +109,7 @@ mod tests {
     #[test]
     fn it_begins_elastic_and_ends_at_its_limit() {
         let z = loop_of((1..=100_000).map(|k| f64::from(k) * 1e-4));
-        // ż = ṡ for small s, and nothing more where A = (β + γ)·z.
+        // ż = ṡ for small s, and 0 where A = (β + γ)·z.
         assert!((z[9] - 1e-3).abs() < 1e-5, "{}", z[9]);
         assert!((z[99_999] - 1.0 / 2.5).abs() < 1e-3, "{}", z[99_999]);
     }

@@ -31,7 +31,7 @@ impl<T: Real> Physics<T> for ConstantDelay<T> {
         name: "constant-delay",
         rust: "constant_delay::ConstantDelay",
         place: Place::Delay,
-        summary: "the delay is the same all the time",
+        summary: "the dead time is constant",
         equation: "h constant",
         parameters: &[Parameter::new(
             "delay",

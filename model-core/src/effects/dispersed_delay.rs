@@ -1,13 +1,13 @@
-//! Turbulence spreads what the jets send on its way to the sensor.
+//! Turbulence disperses the jets on their way to the sensor.
 //!
-//! Not a missing effect but a property of every transport in a turbulent flow or a duct: it belongs to the
-//! base model, so that the lag of a valve or a film is not bent to imitate it.
+//! This is not a missing effect but a property of every transport in a turbulent flow or a duct. It belongs to the
+//! base model, so that the lag of a valve or a film does not imitate it.
 
 use crate::effect::{Effect, Instant, Parameter, Physics, Place, Setting, Spec, Unit, take};
 use crate::real::Real;
 
-/// Three lags in series, σ/√3 each: the delay has the standard deviation σ and is √3·σ longer in the mean.
-/// Exact, stage by stage, for a jet that is constant over the sample.
+/// Three lags in series, σ/√3 each: the delay has the standard deviation σ, and its mean is √3·σ longer. Each stage
+/// is exact for a jet that is constant over the sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DispersedDelay<T> {
     share: T,
@@ -33,8 +33,8 @@ impl<T: Real> Physics<T> for DispersedDelay<T> {
         name: "dispersed-delay",
         rust: "dispersed_delay::DispersedDelay",
         place: Place::Jet,
-        summary: "turbulence spreads the jets on their way to the sensor",
-        equation: "three lags of σ/√3 in series: delays have the standard deviation σ",
+        summary: "turbulence disperses the jets on their way to the sensor",
+        equation: "three lags of σ/√3 in series; σ is the standard deviation of the delay",
         parameters: &[Parameter::new(
             "spread",
             Unit::Second,

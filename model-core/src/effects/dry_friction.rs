@@ -5,7 +5,7 @@ use crate::effect::{
 };
 use crate::real::Real;
 
-/// Adds −F·sign(ṡ), and holds the flow if the motion would be less than F per sample: the sign is that of the
+/// Adds −F·sign(ṡ), and holds the flow if the motion would be less than F per sample. The sign is that of the
 /// present step, as in continuous time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DryFriction<T> {
@@ -31,8 +31,8 @@ impl<T: Real> Physics<T> for DryFriction<T> {
         name: "dry-friction",
         rust: "dry_friction::DryFriction",
         place: Place::Flow,
-        summary: "Coulomb friction acts against the motion",
-        equation: "adds −F·sign(s_{k+1} − s_k)",
+        summary: "Coulomb friction opposes every change of the flow",
+        equation: "−F·sign(s_{k+1} − s_k) is added to the drive",
         parameters: &[Parameter::new(
             "level",
             Unit::YPerSample,

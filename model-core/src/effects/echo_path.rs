@@ -12,7 +12,8 @@ use core::marker::PhantomData;
 /// [`Echo`] with d of at most `LEN` − 2 samples.
 pub type EchoPath<T, const LEN: usize> = Echo<T, DelayLine<T, LEN>>;
 
-/// j(t) = v(t) + g·v(t − d), with v remembered by `M`, for d of at most [`LONGEST_BUFFER`] − 2 samples; without echo beyond.
+/// j(t) = v(t) + g·v(t − d), with v stored in `M`, for d of at most [`LONGEST_BUFFER`] − 2 samples; without echo
+/// beyond.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Echo<T, M> {
     gain: T,
@@ -38,7 +39,7 @@ impl<T: Real, M: Reaching<T>> Physics<T> for Echo<T, M> {
         rust: "echo_path::EchoPath",
         rust_type: RustType::Buffer(1),
         place: Place::Jet,
-        summary: "the jet arrives a second time, later",
+        summary: "the jet reaches the flow a second time, by a longer path",
         equation: "j(t) = v(t) + g·v(t − d)",
         parameters: &[
             Parameter::new("gain", Unit::None, [-1.0, 1.0], &[-0.2, 0.2]),
@@ -50,7 +51,7 @@ impl<T: Real, M: Reaching<T>> Physics<T> for Echo<T, M> {
             ),
         ],
         amplitude: Some(Amplitude::new("gain", "an echo of the jet").linear()),
-        source: "a second path of convection or an acoustic reflection",
+        source: "a second path of convection, or an acoustic reflection",
         ..Spec::PLAIN
     };
 

@@ -23,7 +23,7 @@ pub struct EdgeDependentDelay<T> {
 pub struct Run<T> {
     /// Its level.
     level: T,
-    /// The passed level when it changed to that level.
+    /// The level that was passed on when the command changed to the present level.
     before: T,
     /// The passed level.
     through: T,
@@ -85,8 +85,8 @@ impl<T: Real> Physics<T> for EdgeDependentDelay<T> {
         name: "edge-dependent-delay",
         rust: "edge_dependent_delay::EdgeDependentDelay",
         place: Place::Delay,
-        summary: "rising edges arrive later (or earlier) than falling ones",
-        equation: "rising edges arrive after h_r, falling edges after h_f",
+        summary: "rising and falling edges have different dead times",
+        equation: "the dead time is h_r for rising edges and h_f for falling edges",
         parameters: &[
             Parameter::new("rise_delay", Unit::Second, [0.001, 0.5], &[0.045]),
             Parameter::new("fall_delay", Unit::Second, [0.001, 0.5], &[0.03]),
@@ -98,7 +98,7 @@ impl<T: Real> Physics<T> for EdgeDependentDelay<T> {
             &[StartValue::Delay(1.0), StartValue::Delay(-1.0)],
         ]),
         law: Some(LawCard {
-            words: "{} after rising, {} after falling edges",
+            words: "{} after rising edges, {} after falling edges",
             shapes_command: true,
             ..LawCard::PLAIN
         }),

@@ -5,8 +5,8 @@ use crate::effect::{
 };
 use crate::real::Real;
 
-/// y = s + g·u(t − d), u between samples as a straight line. A rig that reads before it sets the command of the same
-/// row shows the command a sample later than one that reads after it; d of more than two samples counts as two.
+/// y = s + g·u(t − d), with u linear between samples. A rig that reads before it sets the command of the same row
+/// shows the command one sample later than a rig that reads after it. d of more than two samples counts as two.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ElectricalPickup<T> {
     gain: T,
@@ -34,7 +34,7 @@ impl<T: Real> Physics<T> for ElectricalPickup<T> {
         name: "electrical-pickup",
         rust: "electrical_pickup::ElectricalPickup",
         place: Place::Sensor,
-        summary: "the command shows in the reading at once",
+        summary: "the command couples electrically into the reading, without the flow",
         equation: "y(t) = s(t) + g·u(t − d)",
         parameters: &[
             Parameter::new("gain", Unit::Y, [-0.5, 0.5], &[0.05]),

@@ -18,7 +18,7 @@ impl<T: Real> Effect<T> for FreeStreamVariation<T> {
     fn start(&self) {}
     #[inline(always)]
     fn jet(&self, _state: &mut (), jet: T, at: &Instant<'_, T>) -> T {
-        // An unconnected channel counts as at its reference.
+        // Without a channel, its reference is used.
         let speed = at
             .channels
             .get(self.channel)
@@ -33,7 +33,7 @@ impl<T: Real> Physics<T> for FreeStreamVariation<T> {
         name: "free-stream-variation",
         rust: "free_stream_variation::FreeStreamVariation",
         place: Place::Jet,
-        summary: "the free stream varies during the run",
+        summary: "the speed of the free stream varies during the record",
         equation: "j = v·(1 + g·(U∞/U_ref − 1))",
         parameters: &[Parameter::new(
             "gain",

@@ -42,7 +42,7 @@ impl<T: Real> Physics<T> for HotFilmLag<T> {
         name: "hot-film-lag",
         rust: "hot_film_lag::HotFilmLag",
         place: Place::Sensor,
-        summary: "the hot-film follows the friction with a lag",
+        summary: "the hot film follows the friction with a first-order lag",
         equation: "τ·ẏ = s − y",
         parameters: &[Parameter::new(
             "time_constant",

@@ -4,7 +4,7 @@ use crate::effect::{Effect, Instant, Parameter, Physics, Place, Setting, Spec, U
 use crate::real::Real;
 
 /// E² = 1 + κ·((s + s0)/r)^(1/3); y = r·(E − E(0))/(E(r) − E(0)), calibrated at 0 and at the reference r. A film
-/// cannot tell a reversed flow: s + s0 below 0 counts as 0.
+/// does not measure the direction of the flow: s + s0 below 0 counts as 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HotFilmNonlinearity<T> {
     ratio: T,
@@ -39,7 +39,7 @@ impl<T: Real> Physics<T> for HotFilmNonlinearity<T> {
         name: "hot-film-nonlinearity",
         rust: "hot_film_nonlinearity::HotFilmNonlinearity",
         place: Place::Sensor,
-        summary: "the hot-film's voltage follows King's law, not the friction",
+        summary: "the hot film's voltage follows King's law and is not proportional to the friction",
         equation: "E² = 1 + κ·((s + s0)/r)^(1/3); y = r·(E − E(0))/(E(r) − E(0))",
         parameters: &[
             Parameter::new("king_ratio", Unit::None, [0.1, 10.0], &[0.5, 3.0]),

@@ -24,7 +24,7 @@ impl<T: Real> Physics<T> for InputNonlinearity<T> {
         name: "input-nonlinearity",
         rust: "input_nonlinearity::InputNonlinearity",
         place: Place::Jet,
-        summary: "the response is not proportional to the input",
+        summary: "the effect of the jets is not proportional to the command",
         equation: "j = v + g2·v² + g3·v³",
         parameters: &[
             Parameter::new("quadratic", Unit::PerU, [-10.0, 10.0], &[0.1]),

@@ -1,7 +1,8 @@
-//! The drive of the flow lags the jets, and goes the wrong way first where the reversal is above 0.
+//! The drive of the flow lags the jets; with a positive reversal it first responds in the opposite direction.
 //!
-//! Not a missing effect but a property of separated flows: an effective incidence lags, and jets cut the old vortex off
-//! before they attach the flow. It belongs to the base model, so that vortices and echoes are not bent to imitate it.
+//! This is not a missing effect but a property of separated flows: an effective incidence lags, and jets cut the
+//! old vortex off before they attach the flow. It belongs to the base model, so that vortices and echoes do not
+//! imitate it.
 
 use crate::effect::{
     Amplitude, Effect, Instant, Parameter, Physics, Place, Setting, Spec, Unit, take,
@@ -9,7 +10,7 @@ use crate::effect::{
 use crate::real::Real;
 
 /// τ·ẇ = j − w; the flow receives (1 + g)·w − g·j. The reversal g puts a zero in the right half plane at 1/(g·τ);
-/// without it the drive is a plain lag. Exact for a jet that holds over the sample.
+/// without it the drive is a plain lag. Exact for a jet that is constant over the sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LaggingDrive<T> {
     reversal: T,
@@ -39,18 +40,16 @@ impl<T: Real> Physics<T> for LaggingDrive<T> {
         name: "lagging-drive",
         rust: "lagging_drive::LaggingDrive",
         place: Place::Jet,
-        summary: "the drive of the flow lags the jets, at first in the wrong direction",
+        summary: "the flow follows the jets with a lag, and may first respond in the opposite direction",
         equation: "τ·ẇ = j − w; the flow receives (1 + g)·w − g·j",
         parameters: &[
             Parameter::new("reversal", Unit::None, [0.0, 5.0], &[0.5]),
             Parameter::new("lag", Unit::Second, [0.002, 0.3], &[0.008, 0.025, 0.08]),
         ],
-        amplitude: Some(Amplitude::new(
-            "reversal",
-            "a first response in the wrong direction",
-        )),
+        amplitude: Some(Amplitude::new("reversal", "an inverse response")),
         base: true,
-        source: "Kerstens et al., AIAA J. 49 (2011): lift falls before it rises; lagging incidence: Goman and Khrabrov, J. Aircraft 31 (1994)",
+        source: "inverse response of the lift: Kerstens et al., AIAA J. 49 (2011); lagging incidence: Goman \
+             and Khrabrov, J. Aircraft 31 (1994)",
         ..Spec::PLAIN
     };
 

@@ -1,15 +1,15 @@
 //! The flow attaches or separates at a rate that depends on its level.
 //!
-//! Not a missing effect but a property of the flow itself: it belongs to the base
-//! model, so that nothing else is bent to imitate it.
+//! This is not a missing effect but a property of the flow itself. It belongs to the base model, so that other
+//! effects do not imitate it.
 
 use crate::effect::{
     Amplitude, Effect, Flow, Instant, Parameter, Physics, Place, Setting, Spec, Unit, take,
 };
 use crate::real::Real;
 
-/// Multiplies what the separated flow has in the step of the flow by 1 + p·s and what the
-/// attached one has by 1 + q·s: all of it where the jets are off, or full.
+/// Multiplies the part of the separated flow in a step by 1 + p·s, and the part of the attached flow by 1 + q·s.
+/// With the jets off or full, one of these parts is the whole step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LevelRate<T> {
     separating: T,
@@ -35,16 +35,14 @@ impl<T: Real> Physics<T> for LevelRate<T> {
         name: "level-rate",
         rust: "level_rate::LevelRate",
         place: Place::Flow,
-        summary: "the rate of the flow depends on its level",
-        equation: "adds s_k·(p·Δs_off + q·Δs_on), Δs_off + Δs_on being s_{k+1} − s_k",
+        summary: "the relaxation rate of the flow depends on its level",
+        equation: "s_k·(p·Δs_off + q·Δs_on) is added; Δs_off and Δs_on are the parts of s_{k+1} − s_k without \
+             and with jet",
         parameters: &[
             Parameter::new("separating", Unit::PerY, [-3.0, 3.0], &[0.0]),
             Parameter::new("attaching", Unit::PerY, [-3.0, 3.0], &[0.0]),
         ],
-        amplitude: Some(Amplitude::new(
-            "separating",
-            "a rate that changes with the level",
-        )),
+        amplitude: Some(Amplitude::new("separating", "a level-dependent rate")),
         base: true,
         source: "expansion of the rate of eq. (3) to first order in y",
         ..Spec::PLAIN

@@ -42,7 +42,7 @@ use crate::effect::{Effect, Flow, Instant, Physics, Place, Setting, Spec};
 use crate::history::{DelayLine, Reaching};
 use crate::real::Real;
 
-/// Longest memory of an effect, samples: half a second at 0.13 ms a sample.
+/// Longest memory of an effect, samples: half a second at 0.13 ms per sample.
 pub const LONGEST_BUFFER: usize = 4096;
 
 macro_rules! delay_laws {
@@ -113,7 +113,8 @@ macro_rules! catalogue {
     ($($file:ident :: $effect:ident : $type:ty),+ $(,)?) => {
         $(pub use $file::$effect;)+
 
-        /// Any effect of the catalogue but the delay laws, chosen at run time. Those that remember a signal do so in `M`.
+        /// Any effect of the catalogue except the delay laws, chosen at run time. Effects with a memory of a signal
+        /// store it in `M`.
         #[derive(Clone, Copy, Debug)]
         #[allow(clippy::large_enum_variant, reason = "a handful per model, on the host")]
         pub enum AnyEffect<T: Real, M> {
@@ -127,7 +128,7 @@ macro_rules! catalogue {
             $(#[doc = concat!("of `", stringify!($file), "`")] $effect(<$type as Effect<T>>::State),)+
         }
 
-        /// The cards of the effects other than delay laws.
+        /// The cards of the effects except delay laws.
         const EFFECTS: &[Spec] = &[
             $({
                 #[allow(dead_code, reason = "not every effect has numbers")]
@@ -148,7 +149,7 @@ macro_rules! catalogue {
                 None
             }
 
-            /// The place on its card: it leaves the signals of the others unchanged.
+            /// The place on its card: it leaves the signals of the other places unchanged.
             #[must_use]
             pub const fn place(&self) -> Place {
                 match self {

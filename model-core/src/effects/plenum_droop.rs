@@ -42,7 +42,7 @@ impl<T: Real> Physics<T> for PlenumDroop<T> {
         name: "plenum-droop",
         rust: "plenum_droop::PlenumDroop",
         place: Place::Jet,
-        summary: "the supply pressure sinks while blowing",
+        summary: "the supply pressure falls while the jets blow and recovers at rest",
         equation: "Ṗ = (1 − P)/τ_r − κ·v·P, P(0) = 1; j = v·P",
         parameters: &[
             Parameter::new(

@@ -5,8 +5,8 @@ use crate::effect::{
 };
 use crate::real::Real;
 
-/// Adds −d·Δ·|Δ| with Δ the step being taken, s_{k+1} − s_k: the implicit form,
-/// which is stable for any d ≥ 0 and what continuous time comes to.
+/// Adds −d·Δ·|Δ| with Δ the present step, s_{k+1} − s_k. This implicit form is stable for any d ≥ 0 and agrees with
+/// continuous time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct QuadraticDrag<T> {
     coefficient: T,
@@ -34,8 +34,8 @@ impl<T: Real> Physics<T> for QuadraticDrag<T> {
         name: "quadratic-drag",
         rust: "quadratic_drag::QuadraticDrag",
         place: Place::Flow,
-        summary: "drag grows with the square of the speed of change",
-        equation: "adds −d·(s_{k+1} − s_k)·|s_{k+1} − s_k|",
+        summary: "the resistance of the flow grows with the square of its rate of change",
+        equation: "−d·(s_{k+1} − s_k)·|s_{k+1} − s_k| is added",
         parameters: &[
             Parameter::new("coefficient", Unit::SamplesPerY, [-1000.0, 1000.0], &[1.0]).positive(),
         ],

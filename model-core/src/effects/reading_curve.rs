@@ -1,13 +1,13 @@
 //! A monotone curve between the flow and its reading.
 //!
-//! Not a missing effect but a property of where the sensor stands: the friction below a reattachment that passes, or a lift
-//! that follows the separation point, is an S-shaped function of what the flow's balance is linear in. It belongs to the
-//! base model, so that hysteresis and lags are not bent to imitate it.
+//! This is not a missing effect but a property of the sensor's position. The friction near a moving reattachment
+//! line, or a lift that follows the separation point, is an S-shaped function of the state in which the flow is
+//! linear. It belongs to the base model, so that hysteresis and lags do not imitate it.
 
 use crate::effect::{Effect, Instant, Parameter, Physics, Place, Setting, Spec, Unit, take};
 use crate::real::Real;
 
-/// y = w·(tanh((s − c)/w) + tanh(c/w)): 0 at 0, slope 1 at the centre c, straight for a large width w.
+/// y = w·(tanh((s − c)/w) + tanh(c/w)): 0 at 0, slope 1 at the centre c, almost linear for a large width w.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ReadingCurve<T> {
     centre: T,
@@ -40,7 +40,7 @@ impl<T: Real> Physics<T> for ReadingCurve<T> {
         name: "reading-curve",
         rust: "reading_curve::ReadingCurve",
         place: Place::Sensor,
-        summary: "the reading is an S-shaped function of the flow",
+        summary: "the reading is an S-shaped function of the flow's state",
         equation: "y = w·(tanh((s − c)/w) + tanh(c/w))",
         parameters: &[
             Parameter::new("centre", Unit::Y, [-10.0, 10.0], &[0.25, 0.75]),
@@ -82,7 +82,7 @@ mod tests {
         }
     }
 
-    /// Far outside the exponential is 0 or overflows; the curve is at its ends there, in both precisions.
+    /// Far outside, the exponential is 0 or overflows; the curve is then at its ends, in both precisions.
     #[test]
     fn it_ends_at_its_limits() {
         for x in [100.0_f32, 1e6, f32::MAX] {

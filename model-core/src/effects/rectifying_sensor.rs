@@ -22,7 +22,7 @@ impl<T: Real> Physics<T> for RectifyingSensor {
         rust: "rectifying_sensor::RectifyingSensor",
         rust_type: RustType::Plain,
         place: Place::Sensor,
-        summary: "the sensor cannot tell the sign",
+        summary: "the sensor does not measure the sign of the friction",
         equation: "y = |s|",
         parameters: &[],
         source: "Bruun, Hot-wire Anemometry (1995)",

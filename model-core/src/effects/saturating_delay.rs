@@ -11,11 +11,11 @@ use crate::real::Real;
 pub struct SaturatingDelay<T> {
     /// p0, samples: the delay of the attached flow.
     pub floor: T,
-    /// p1, samples: how much longer the delay of the separated flow is.
+    /// p1, samples: additional delay of the separated flow.
     pub rise: T,
     /// y₁, y: above it the delay is that of the attached flow.
     pub level: T,
-    /// b, −1 to 1: above 0 most of it is lost near y₁, below 0 near rest.
+    /// b, −1 to 1: above 0 the delay falls mostly near y₁, below 0 mostly near rest.
     pub bend: T,
 }
 
@@ -49,7 +49,7 @@ impl<T: Real> Physics<T> for SaturatingDelay<T> {
         name: "saturating-delay",
         rust: "saturating_delay::SaturatingDelay",
         place: Place::Delay,
-        summary: "the delay shortens until the flow has attached so far",
+        summary: "the dead time shortens until y reaches a level, and is constant above it",
         equation: "h = p0 + p1·(1 − x)·(1 + b·x), x = min(ỹ/y₁, 1)",
         parameters: &[
             Parameter::new("delay_floor", Unit::Samples, [0.0, 500.0], &[30.0]),
@@ -79,11 +79,11 @@ impl<T: Real> Physics<T> for SaturatingDelay<T> {
         ]),
         base: true,
         law: Some(LawCard {
-            words: "{} + {}·(1 − x)·(1 + b·x) samples with x = ỹ/{} at most 1 and b = {}",
+            words: "{} + {}·(1 − x)·(1 + b·x) samples, with x = ỹ/{} (at most 1) and b = {}",
             fields: Some(&["floor", "rise", "level", "bend"]),
             ..LawCard::PLAIN
         }),
-        source: "eq. (2) with an end: delays measured edge by edge (Fig. 8) say no more of its form",
+        source: "form like eq. (2) with a finite end; measured edge delays (Fig. 8) do not distinguish the two",
         ..Spec::PLAIN
     };
 

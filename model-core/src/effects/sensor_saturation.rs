@@ -26,7 +26,7 @@ impl<T: Real> Physics<T> for SensorSaturation<T> {
         name: "sensor-saturation",
         rust: "sensor_saturation::SensorSaturation",
         place: Place::Sensor,
-        summary: "the sensor has a limited range",
+        summary: "the reading is limited to the sensor's range",
         equation: "y = min(max(s, lo), hi)",
         parameters: &[
             Parameter::new("lower_limit", Unit::Y, [-10.0, 10.0], &[-0.05]),

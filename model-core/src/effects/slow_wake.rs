@@ -1,15 +1,15 @@
-//! The wake follows the flow slowly and pulls it back.
+//! A slow state of the wake follows the flow and reduces its level.
 //!
-//! Not a missing effect but a memory of the flow itself: it belongs to the base
-//! model, so that nothing else is bent to imitate it.
+//! This is not a missing effect but a memory of the flow itself. It belongs to the base model, so that other
+//! effects do not imitate it.
 
 use crate::effect::{
     Amplitude, Effect, Flow, Instant, Parameter, Physics, Place, Setting, Spec, Unit, take,
 };
 use crate::real::Real;
 
-/// T·ẇ = s − w; the level that the flow tends to is lower by g·w. Exact for a flow
-/// that holds over the sample.
+/// T·ẇ = s − w; the level that the flow tends to is lower by g·w. Exact for a flow that is constant over the
+/// sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SlowWake<T> {
     kept: T,
@@ -38,15 +38,15 @@ impl<T: Real> Physics<T> for SlowWake<T> {
         name: "slow-wake",
         rust: "slow_wake::SlowWake",
         place: Place::Flow,
-        summary: "the wake follows the flow slowly and pulls it back",
-        equation: "T·ẇ = s − w; the level that the flow tends to is lower by g·w",
+        summary: "a slow state of the wake follows the flow and reduces its level",
+        equation: "T·ẇ = s − w; g·w is subtracted from the level that the flow tends to",
         parameters: &[
             Parameter::new("time_constant", Unit::Second, [0.05, 3.0], &[0.1, 0.3, 1.0]),
             Parameter::new("pull", Unit::None, [-0.9, 3.0], &[0.2]),
         ],
         amplitude: Some(Amplitude::new("pull", "a slow wake")),
         base: true,
-        source: "a fading memory, which delayed terms of eq. (4) only sample",
+        source: "a memory that fades exponentially; delayed terms of eq. (4) approximate it",
         ..Spec::PLAIN
     };
 

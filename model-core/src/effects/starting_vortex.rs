@@ -28,7 +28,7 @@ impl<T: Real> Physics<T> for StartingVortex<T> {
         name: "starting-vortex",
         rust: "starting_vortex::StartingVortex",
         place: Place::Jet,
-        summary: "the jet's front rolls up into a vortex that helps for a while",
+        summary: "the front of the jet rolls up into a vortex that strengthens the jet for a while",
         equation: "ẇ = −w/τ + max(dj/dt, 0); the flow receives j + g·w",
         parameters: &[
             Parameter::new("gain", Unit::None, [0.0, 3.0], &[0.5]),

@@ -8,8 +8,8 @@ use crate::real::Real;
 
 /// h = p0 + p1·exp(−p2·ỹ), samples, eq. (2).
 ///
-/// A negative ỹ counts as 0: the exponential would run away (theory 1.1: at
-/// ỹ = −0.1 it would be 2.4 times the delay of the natural flow).
+/// A negative ỹ counts as 0, because the exponential would become very large (theory 1.1: at ỹ = −0.1 it would be
+/// 2.4 times the delay of the natural flow).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StateDependentDelay<T> {
     /// p0, samples: the delay of the attached flow.
@@ -46,7 +46,7 @@ impl<T: Real> Physics<T> for StateDependentDelay<T> {
         name: "state-dependent-delay",
         rust: "state_dependent_delay::StateDependentDelay",
         place: Place::Delay,
-        summary: "the delay shortens as the flow attaches",
+        summary: "the dead time shortens as the flow attaches",
         equation: "h = p0 + p1·exp(−p2·ỹ)",
         parameters: &[
             Parameter::new("delay_floor", Unit::Samples, [0.0, 500.0], &[30.0]),
@@ -109,7 +109,7 @@ mod tests {
         assert_eq!(law.bounds(), Some([47.35, 47.35 + 12.69]));
         assert_eq!(law.delay(0.0), 47.35 + 12.69);
         assert!((law.delay(2.0) - 47.35).abs() < 1e-9);
-        // A share 1 − 1/e of the way at ỹ = 1/p2.
+        // The fraction 1 − 1/e of the change at ỹ = 1/p2.
         let there = law.delay(1.0 / 20.18);
         assert!((there - (47.35 + 12.69 / core::f64::consts::E)).abs() < 1e-9);
         let runaway = StateDependentDelay { rate: -1.0, ..law };

@@ -1,4 +1,4 @@
-//! A vortex rolls up after switch-off and the friction undershoots.
+//! After switching off, a vortex rolls up and reduces the friction for a while.
 
 use crate::effect::{
     Amplitude, Effect, Instant, Parameter, Physics, Place, Setting, Spec, Unit, take,
@@ -28,7 +28,7 @@ impl<T: Real> Physics<T> for StoppingVortex<T> {
         name: "stopping-vortex",
         rust: "stopping_vortex::StoppingVortex",
         place: Place::Jet,
-        summary: "a vortex rolls up after switch-off and the friction undershoots",
+        summary: "after switching off, a vortex rolls up and reduces the friction for a while",
         equation: "ẇ = −w/τ + max(−dj/dt, 0); the flow receives j − g·w",
         parameters: &[
             Parameter::new("gain", Unit::None, [0.0, 3.0], &[0.5]),

@@ -31,7 +31,7 @@ impl<T: Real> Physics<T> for ThermalDrift<T> {
         name: "thermal-drift",
         rust: "thermal_drift::ThermalDrift",
         place: Place::Sensor,
-        summary: "the reading drifts while the sensor warms up",
+        summary: "the reading drifts towards a final value while the sensor warms up",
         equation: "y = s + A·(1 − exp(−t/τ))",
         parameters: &[
             Parameter::new("amplitude", Unit::Y, [-2.0, 2.0], &[0.05]),

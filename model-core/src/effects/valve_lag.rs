@@ -35,7 +35,7 @@ impl<T: Real> Physics<T> for ValveLag<T> {
         name: "valve-lag",
         rust: "valve_lag::ValveLag",
         place: Place::Jet,
-        summary: "the valve opens and closes gradually",
+        summary: "the valve opens and closes with first-order lags",
         equation: "v̇ = (u − v)/τ_o while u > v, (u − v)/τ_c otherwise",
         parameters: &[
             Parameter::new("opening_time", Unit::Second, [0.001, 0.05], &[0.004, 0.015]),

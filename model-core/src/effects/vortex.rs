@@ -1,18 +1,18 @@
-//! What starting and stopping vortices have in common: fed by one kind of edge, decaying, added to the jet.
+//! Common part of the starting and the stopping vortex: a state that one kind of edge increases, that decays, and
+//! that is added to the jet.
 
 use crate::real::Real;
 
 /// ẇ = −w/τ + edges; the flow receives g·w.
 ///
-/// `strength` is the mean of w over the sample, which is what a flow that
-/// integrates its drive receives; so a change within a sample or at its start
-/// gives the same vortex.
+/// `strength` is the mean of w over the sample, because the flow integrates its drive. A change within a sample or
+/// at its start therefore gives the same vortex.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Shedding<T> {
     gain: T,
     /// Decay over a sample.
     kept: T,
-    /// Mean over a sample of a vortex born at its start.
+    /// Mean over a sample of a vortex created at its start.
     mean: T,
 }
 
@@ -34,8 +34,8 @@ impl<T: Real> Shedding<T> {
         }
     }
 
-    /// What the flow receives after a sample in which the jet comes to `jet`;
-    /// `edge` is what of a change of the jet makes a vortex.
+    /// The drive of the flow after a sample in which the jet changes to `jet`; `edge` selects the changes of the
+    /// jet that create a vortex.
     #[inline(always)]
     pub(super) fn step(&self, vortex: &mut Vortex<T>, jet: T, edge: impl Fn(T) -> T) -> T {
         let fed = edge(jet - vortex.jet).at_least(T::ZERO);
@@ -54,8 +54,8 @@ impl<T: Real> Vortex<T> {
     }
 }
 
-/// ∫w dt = τ for an edge of 1, however long the samples are: what the rising and
-/// the falling edge of a pulse add to the jet, in all.
+/// ∫w dt = τ for an edge of 1, whatever the sample period: the total contribution of the rising and the falling
+/// edge of a pulse.
 #[cfg(test)]
 pub(super) fn areas(effect: &impl crate::Effect<f64>) -> [f64; 2] {
     let jet = |k| if (100..600).contains(&k) { 1.0 } else { 0.0 };

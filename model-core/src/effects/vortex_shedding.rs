@@ -1,12 +1,12 @@
-//! Jets set off the flow's own oscillation, which the sensor sees on top of the friction.
+//! Jets excite the flow's own oscillation, which the sensor measures in addition to the friction.
 
 use crate::effect::{
     Amplitude, Effect, Instant, Parameter, Physics, Place, Setting, Spec, Unit, take,
 };
 use crate::real::Real;
 
-/// q̈ + 2ζω·q̇ + ω²·q = ω²·j(t − h); y gets + g·(q − j(t − h)). Exact for a jet
-/// held over the sample; ζ is taken as below 1.
+/// q̈ + 2ζω·q̇ + ω²·q = ω²·j(t − h); g·(q − j(t − h)) is added to y. Exact for a jet that is constant over the
+/// sample; ζ is limited to below 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VortexShedding<T> {
     gain: T,
@@ -46,8 +46,8 @@ impl<T: Real> Physics<T> for VortexShedding<T> {
         name: "vortex-shedding",
         rust: "vortex_shedding::VortexShedding",
         place: Place::Sensor,
-        summary: "the jets excite the shedding, which rings in the friction",
-        equation: "q̈ + 2ζω·q̇ + ω²·q = ω²·j(t − h); y gets + g·(q − j(t − h))",
+        summary: "the jets excite vortex shedding, which is visible in the friction as a damped oscillation",
+        equation: "q̈ + 2ζω·q̇ + ω²·q = ω²·j(t − h); g·(q − j(t − h)) is added to y",
         parameters: &[
             Parameter::new(
                 "frequency",
@@ -55,7 +55,7 @@ impl<T: Real> Physics<T> for VortexShedding<T> {
                 [1.0, 200.0],
                 &[3.0, 6.0, 10.0, 16.0, 25.0, 40.0],
             ),
-            // More would be no ringing, but a lag.
+            // A larger damping ratio would give a lag, not an oscillation.
             Parameter::new("damping_ratio", Unit::None, [0.005, 0.6], &[0.05, 0.2]),
             Parameter::new("gain", Unit::Y, [-2.0, 2.0], &[0.15]),
         ],

@@ -1,7 +1,7 @@
-//! The sensor's zero is not where it should be.
+//! The sensor reads a constant offset.
 //!
-//! Not a missing effect but a nuisance that every rig may have: it belongs to the
-//! base model, so that nothing else is bent to imitate it.
+//! This is not a missing effect but a disturbance that every rig may have. It belongs to the base model, so that
+//! other effects do not imitate it.
 
 use crate::effect::{
     Amplitude, Effect, Instant, Parameter, Physics, Place, Setting, Spec, Unit, take,
@@ -28,12 +28,12 @@ impl<T: Real> Physics<T> for ZeroOffset<T> {
         name: "zero-offset",
         rust: "zero_offset::ZeroOffset",
         place: Place::Sensor,
-        summary: "the sensor does not read 0 where there is no friction gain",
+        summary: "the sensor reads a constant offset without friction gain",
         equation: "y = s + o",
         parameters: &[Parameter::new("level", Unit::Y, [-1e6, 1e6], &[0.0])],
         amplitude: Some(Amplitude::new("level", "an offset of the sensor").linear()),
         base: true,
-        source: "calibration: the zero of normalised friction is the natural, separated flow",
+        source: "definition: the normalised friction is 0 for the natural, separated flow",
         ..Spec::PLAIN
     };
 

@@ -104,7 +104,7 @@ impl Marks {
 }
 
 impl<'a> Cell<'a> {
-    /// What `text`, trimmed and without quotes, is.
+    /// The kind of `text`, which is trimmed and without quotes.
     pub(super) fn of(text: &'a str, decimals: Decimals) -> Self {
         if text.is_empty() {
             return Self::Empty;
@@ -176,7 +176,7 @@ fn number(text: &str, decimals: Decimals) -> Option<Number<'_>> {
     })
 }
 
-/// Marks of thousands beside points and commas.
+/// Thousands marks other than points and commas.
 const GROUPS: [char; 5] = ['\'', '’', ' ', '\u{a0}', '\u{202f}'];
 
 /// The digits with their marks at the start of a cell, without the sign, and what follows.

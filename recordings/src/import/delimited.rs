@@ -165,8 +165,8 @@ impl Rows {
         for separator in Separator::ALL {
             let mut before: Option<(usize, usize)> = None;
             for (at, line) in lines.iter().enumerate().take(HEAD) {
-                // The earliest table wins; of two separators that fit equally, the first in the list, so that `1,5;2,5` is two
-                // numbers.
+                // The earliest table is used; of two separators that fit equally, the first in the list, so that
+                // `1,5;2,5` is two numbers.
                 if found.is_some_and(|rows| at > rows.first) && before.is_none() {
                     break;
                 }
@@ -193,7 +193,7 @@ impl Rows {
         found
     }
 
-    /// The line that is most like a row although none follows: its index and its first cell that is not a
+    /// The line that resembles a row most, although no row follows: its index and its first cell that is not a
     /// value.
     pub(super) fn nearest<'a>(lines: &[&'a str]) -> Option<(usize, Cow<'a, str>)> {
         let mut best: Option<(usize, usize, &str)> = None;

@@ -116,7 +116,8 @@ fn pairs(line: &str) -> Vec<(&str, &str)> {
     each.collect()
 }
 
-/// The clock times before the arrows of a serial monitor and the lines behind them; none where most lines have no arrow.
+/// The clock times before the arrows of a serial monitor, and the text after them; `None` if most lines have no
+/// arrow.
 pub(super) fn arrows<'a>(lines: &[&'a str]) -> Option<Vec<(&'a str, &'a str)>> {
     let split = |line: &&'a str| -> Option<(&'a str, &'a str)> {
         let (stamp, rest) = line.split_once("->")?;
@@ -126,7 +127,8 @@ pub(super) fn arrows<'a>(lines: &[&'a str]) -> Option<Vec<(&'a str, &'a str)>> {
     before_lines(lines, split)
 }
 
-/// The dates or clock times with which the lines of a log begin and what follows; none where most lines begin otherwise.
+/// The dates or clock times at the beginnings of the lines of a log, and the text after them; `None` if most lines
+/// begin otherwise.
 pub(super) fn leading<'a>(lines: &[&'a str]) -> Option<Vec<(&'a str, &'a str)>> {
     let split = |line: &&'a str| -> Option<(&'a str, &'a str)> {
         let line = line.trim_start();

@@ -15,23 +15,23 @@ use crate::error::{DataError, DataProblem, FilePlace};
 use crate::folder::mapping_of;
 use crate::record::{Origin, RESERVED, Record, Use};
 
-/// How a file's variables become a record. Kept in `dataset.toml` as the record's `[record.from]`.
+/// The assignment of a file's variables to a record. Stored in `dataset.toml` as the record's `[record.from]`.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Mapping {
-    /// The time; none: found by its name, or the sampling period is given.
+    /// The time; `None`: found by its name, or the sampling period is given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub t: Option<String>,
-    /// Seconds in one unit of the time; none: as its header says, otherwise 1.
+    /// Seconds per unit of the time; `None`: as stated in its header, otherwise 1.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub t_scale: Option<f64>,
-    /// Sampling period, s, in place of a time, or to check it.
+    /// Sampling period, s, if the file has no time, or to check it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub period_s: Option<f64>,
-    /// The rows are a sampling period apart, whatever the file's time says.
+    /// The rows are a sampling period apart, and the file's time is ignored.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub ignore_time: bool,
-    /// The command; none: found by its name.
+    /// The command; `None`: found by its name.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub u: Option<String>,
     /// Factor of u: u = u_scale · variable + u_offset.
@@ -43,7 +43,7 @@ pub struct Mapping {
     /// u is 1 above this value of the scaled command and 0 elsewhere: makes a voltage an on/off command.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub u_threshold: Option<f64>,
-    /// The output; none: found by its name.
+    /// The output; `None`: found by its name.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub y: Option<String>,
     /// Factor of y: y = y_scale · variable + y_offset.
@@ -52,7 +52,7 @@ pub struct Mapping {
     /// Offset of y. Standard errors and envelopes are scaled accordingly.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub y_offset: Option<f64>,
-    /// Further variables to keep; none: all that are as long as u.
+    /// Further variables to keep; `None`: all that are as long as u.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub channels: Option<Vec<String>>,
 }
@@ -69,10 +69,10 @@ pub(super) struct Mapped {
 }
 
 impl Mapping {
-    /// The mapping that an imported data set was made with.
+    /// The mapping with which an imported data set was made.
     ///
     /// # Errors
-    /// [`DataError`] when there is no readable `dataset.toml`, or it holds no mapping.
+    /// [`DataError`] if there is no readable `dataset.toml`, or it contains no mapping.
     pub fn of(folder: &Path) -> Result<Self, DataError> {
         mapping_of(folder)
     }
@@ -88,7 +88,7 @@ impl Mapping {
             Some(name) => find(source, name, file).map(Some),
             None => known_as(source, known, file),
         };
-        // A variable with another known role is no candidate.
+        // A variable with another known role is not a candidate.
         let time = match &self.t {
             Some(name) => source.get(name),
             None => known_as(source, &TIMES, &FilePlace::default())
@@ -140,7 +140,7 @@ impl Mapping {
         Ok((u, y))
     }
 
-    /// The factor of the command: a command in percent is one of 0 to 1 unless a factor is given.
+    /// The factor of the command: a command in percent becomes one of 0 to 1, unless a factor is given.
     fn scale_of_command(
         &self,
         u: &Variable,
@@ -251,7 +251,7 @@ impl Mapping {
             }
         } else if let Some((low, high)) = two_levels(&command) {
             remarks.push(format!(
-                "u lies near {} and {}: if this is an on/off command, say --u-threshold {}",
+                "u takes values near {} and {}: if this is an on/off command, use --u-threshold {}",
                 brief(low, 2),
                 brief(high, 2),
                 brief((low + high) / 2.0, 1)
@@ -329,7 +329,10 @@ impl Mapping {
             }
         }
         if record.y_min.is_some() != record.y_max.is_some() {
-            remarks.push("an envelope needs both y_min and y_max; the one is left out".to_owned());
+            remarks.push(
+                "an envelope needs both y_min and y_max; only one is present, so it is left out"
+                    .to_owned(),
+            );
             (record.y_min, record.y_max) = (None, None);
         }
         if let (Some(unit), None) = (&y.unit, self.y_scale) {
@@ -383,7 +386,7 @@ pub(super) fn finite(
     }
 }
 
-/// A command written on change: an empty cell keeps the value before it.
+/// A command written on change: an empty cell keeps the previous value.
 fn held(
     u: &Variable,
     place: &dyn Fn(&Variable, usize) -> FilePlace,
@@ -399,7 +402,7 @@ fn held(
     }
     if !u.blanks.is_empty() {
         remarks.push(format!(
-            "u is written on change only: an empty cell keeps the value before it ({} of {} cells)",
+            "u is written on change only: an empty cell repeats the previous value ({} of {} cells)",
             u.blanks.len(),
             values.len()
         ));
@@ -428,7 +431,7 @@ fn two_levels(u: &[f64]) -> Option<(f64, f64)> {
     (u.iter().filter(near).count() as f64 >= 0.98 * u.len() as f64).then_some((low, high))
 }
 
-/// The value rounded to so many digits after its first.
+/// The value rounded to this many digits after its first.
 fn brief(value: f64, digits: usize) -> f64 {
     format!("{value:.digits$e}").parse().unwrap_or(value)
 }

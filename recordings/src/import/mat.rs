@@ -1,8 +1,8 @@
 //! MATLAB files of versions 5 to 7: arrays of numbers and structures of them.
 //!
-//! The format is published by MathWorks ("MAT-File Format"): a header of 128 bytes, then elements of a tag (type, length) and
-//! data; version 7 packs each variable with zlib. Numbers may be stored in a smaller type than the array's own. Every length
-//! is checked against the bytes that are there before anything is read or reserved.
+//! The format is published by MathWorks ("MAT-File Format"): a header of 128 bytes, then elements of a tag (type,
+//! length) and data. Version 7 compresses each variable with zlib. Numbers may be stored in a smaller type than the
+//! array's own. Every length is checked against the available bytes before anything is read or reserved.
 
 use std::io::Read;
 
@@ -108,7 +108,7 @@ impl<'a> Elements<'a> {
         if self.bytes.is_empty() {
             return Ok(None);
         }
-        let short = || damaged("an element is longer than the file");
+        let short = || damaged("an element extends beyond the end of the file");
         let tag = word(self.bytes, 0, self.order).ok_or_else(short)?;
         let (kind, start, length) = if tag >> 16 != 0 {
             // A small element: length, type and data within eight bytes.
@@ -210,7 +210,7 @@ fn matrix(
             let (size, number) =
                 stored_as(stored.kind).ok_or_else(|| damaged("an unknown type of numbers"))?;
             if count.checked_mul(size) != Some(stored.data.len()) {
-                return Err(damaged("an array with fewer numbers than it says"));
+                return Err(damaged("an array has fewer numbers than its header states"));
             }
             budget.take_array(name, count)?;
             let rows = shape.first().copied().unwrap_or(1);

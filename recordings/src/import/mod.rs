@@ -1,7 +1,7 @@
-//! Files that people have, made into a data set: CSV of any dialect, MATLAB's `.mat`, NumPy's `.npy` and `.npz`.
+//! Conversion of other files to a data set: CSV of any dialect, MATLAB's `.mat`, NumPy's `.npy` and `.npz`.
 //!
-//! A [`Source`] is a file's variables, whatever the format; a [`Mapping`] says which of them is what. The data set that comes
-//! of it is checked as any other, and its `dataset.toml` keeps the mapping.
+//! A [`Source`] contains a file's variables, whatever the format; a [`Mapping`] assigns them. The resulting data
+//! set is checked like any other, and its `dataset.toml` contains the mapping.
 
 mod cell;
 mod column;
@@ -56,10 +56,9 @@ pub struct Import {
     pub title: Option<String>,
     /// Names of validation records (files without their ending).
     pub validate: Vec<String>,
-    /// Splits each record at this time, s: the whole becomes a validation record in which the earlier samples
-    /// are the lead.
+    /// Splits each record at this time, s: the whole becomes a validation record whose lead is the earlier samples.
     pub hold_out_from_s: Option<f64>,
-    /// Command before the first sample of every record; none: its first value.
+    /// Command before the first sample of every record; `None`: its first value.
     pub u_before: Option<f64>,
     /// The input has levels between 0 and 1.
     pub graded: bool,
@@ -99,7 +98,7 @@ impl Imported {
     /// Writes the data set as a folder, with the mapping in its `dataset.toml`.
     ///
     /// # Errors
-    /// [`OutputError`] when the folder cannot be written; nothing is left behind then.
+    /// [`OutputError`] if the folder cannot be written; no partial output remains.
     pub fn save(&self, folder: &Path) -> Result<(), OutputError> {
         self.set.save_from(folder, &self.from)
     }
@@ -142,10 +141,10 @@ const TABLES: [&str; 5] = ["csv", "tsv", "mat", "npy", "npz"];
 /// Endings of text files, which are imported from a folder only if it has none of `TABLES`.
 const TEXTS: [&str; 3] = ["txt", "dat", "log"];
 
-/// The files to import: those named, and for a folder those in it that can be tables, by name.
+/// The files to import: the named ones, and for a folder the possible tables in it, by name.
 ///
 /// # Errors
-/// [`DataError`] when a folder cannot be read, is a data set already, or holds no such file.
+/// [`DataError`] if a folder cannot be read, is a data set already, or contains no such file.
 pub fn files_of(paths: &[&Path]) -> Result<Vec<PathBuf>, DataError> {
     let mut files = Vec::new();
     for path in paths {
@@ -189,7 +188,7 @@ pub fn files_of(paths: &[&Path]) -> Result<Vec<PathBuf>, DataError> {
     Ok(files)
 }
 
-/// Makes a data set of files, one record of each.
+/// Makes a data set of files, one record per file.
 ///
 /// # Errors
 /// [`DataError`] naming file, line and column or variable of the first fault.
@@ -241,7 +240,8 @@ pub fn import(files: &[&Path], request: &Import) -> Result<Imported, DataError> 
     let mut remarks = Vec::new();
     if let Some(one) = unite_periods(&mut records) {
         remarks.push(format!(
-            "The records' sampling periods differ by less than a sample over their length ({} to {} s): all get the mean, {} s.",
+            "The records' sampling periods differ by less than a sample over their length ({} to {} s): all \
+                 get the mean, {} s.",
             one.shortest, one.longest, one.mean
         ));
     }
@@ -278,11 +278,11 @@ fn nothing_held_out(records: &[Record]) -> Option<String> {
         [] => return None,
     };
     Some(format!(
-        "There is no validation record: models would be validated on the data they are fitted to. Hold out {how}."
+        "There is no validation record: models would be validated on the data they are fitted to. Use {how}."
     ))
 }
 
-/// Splits a record at `time`: an estimation record of the samples before it, and the whole as a validation
+/// Splits a record at `time`: the samples before it become an estimation record, and the whole becomes a validation
 /// record with those samples as its lead.
 fn parts(
     record: Record,

@@ -1,7 +1,7 @@
 //! NumPy's `.npy` and `.npz`: a header that is the text of a dictionary, then the numbers.
 //!
-//! Read here and not by a crate: those bring a parser for all of Python's literals where three keys are needed. The archive of
-//! an `.npz` is read by the crate `zip`.
+//! Read here instead of by a crate: available crates contain a parser for all Python literals, but only three keys
+//! are needed. The archive of an `.npz` is read by the crate `zip`.
 
 use std::io::{Cursor, Read};
 use std::path::Path;
@@ -98,7 +98,7 @@ fn array(
     let count = shape.iter().try_fold(1usize, |n, d| n.checked_mul(*d));
     let count = count.ok_or_else(broken)?;
     if count.checked_mul(size) != Some(data.len()) {
-        return Err(damaged("an array with another size than it says"));
+        return Err(damaged("an array has another size than its header states"));
     }
     if count == 0 {
         return Ok(());

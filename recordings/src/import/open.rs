@@ -11,21 +11,21 @@ use crate::error::{DataError, FilePlace};
 use crate::memory;
 
 impl Source {
-    /// Reads the variables of a CSV of any dialect, a MATLAB file (v5 to v7) or NumPy's `.npy` and `.npz`. What a file is, its
-    /// first bytes say, not its name.
+    /// Reads the variables of a CSV of any dialect, a MATLAB file (v5 to v7) or NumPy's `.npy` and `.npz`. The
+    /// format is determined by the first bytes, not by the name.
     ///
     /// # Errors
-    /// [`DataError`] naming the file, and line, column or variable where there is one.
+    /// [`DataError`] naming the file, and line, column or variable if there is one.
     pub fn open(path: &Path) -> Result<Self, DataError> {
         Self::open_beside(path, 0)
     }
 
-    /// The same with so many bytes of memory already in use.
+    /// The same with this many bytes of memory already in use.
     pub(super) fn open_beside(path: &Path, taken: u64) -> Result<Self, DataError> {
         Self::read_beside(path, &read(path, taken)?, taken)
     }
 
-    /// Reads the variables of a file whose content is at hand; `path` names it.
+    /// Reads the variables of a file whose content is in memory; `path` names it.
     ///
     /// # Errors
     /// As [`open`](Self::open).

@@ -8,23 +8,25 @@ use crate::memory::TooMuch;
 pub enum ImportProblem {
     /// A MATLAB file in HDF5 format.
     #[error(
-        "is a MATLAB 7.3 file (HDF5), which is not read here; open it in MATLAB and save it as version 7: load('{name}'); save('{name}', '-v7')",
+        "is a MATLAB 7.3 file (HDF5), which is not supported; open it in MATLAB and save it as version 7: \
+             load('{name}'); save('{name}', '-v7')",
         name = .0
     )]
     Matlab73(String),
     /// An HDF5 file.
     #[error(
-        "is an HDF5 file, which is not read here; save its arrays with numpy.savez(\"run.npz\", t=t, u=u, y=y) or as CSV"
+        "is an HDF5 file, which is not supported; save its arrays with numpy.savez(\"run.npz\", t=t, u=u, y=y) or as CSV"
     )]
     Hdf5,
     /// A workbook or another archive.
     #[error(
-        "is an archive without .npy files (a spreadsheet's workbook is one); save the sheet as CSV"
+        "is an archive without .npy files (for example a spreadsheet's workbook); save the sheet as CSV"
     )]
     NoArrays,
     /// MATLAB 4, or not a MATLAB file.
     #[error(
-        "is no MATLAB file of version 5 or 7; open it in MATLAB or Octave and save it again: save('run.mat', 't', 'u', 'y', '-v7')"
+        "is not a MATLAB file of version 5 to 7; open it in MATLAB or Octave and save it again: \
+             save('run.mat', 't', 'u', 'y', '-v7')"
     )]
     NoMatlab,
     /// A damaged or truncated file.
@@ -35,8 +37,8 @@ pub enum ImportProblem {
     Memory(#[from] TooMuch),
     /// More columns than a table may have.
     #[error(
-        "the rows have {0} cells, and 16384 are the most (a spreadsheet's); a table has a row for each sample and a column for \
-         each signal: transpose it, or save fewer columns"
+        "the rows have {0} cells, but at most 16384 are allowed (the limit of spreadsheets); a table has a row \
+         for each sample and a column for each signal: transpose it, or save fewer columns"
     )]
     TooWide(usize),
     /// No table of numbers was found.
@@ -46,7 +48,7 @@ pub enum ImportProblem {
     NoTable,
     /// A line that is almost a row of a table.
     #[error(
-        "no rows of numbers were found; this line comes closest, but its cell `{0}` is no number, date, time or on/off word; correct it, or write a header line and rows of at least two numbers, separated by commas, semicolons, tabs or blanks"
+        "no rows of numbers were found; this line comes closest, but its cell `{0}` is not a number, date, time or on/off word; correct it, or write a header line and rows of at least two numbers, separated by commas, semicolons, tabs or blanks"
     )]
     NearlyRow(String),
     /// An unreadable cell of a required column.
@@ -54,7 +56,7 @@ pub enum ImportProblem {
     Unread(String),
     /// A command written on change without a first value.
     #[error(
-        "the first value of u is missing, which a command that is written on change only needs; write it into this cell"
+        "the first value of u is missing, although u is written only when it changes; write the value into this cell"
     )]
     NoFirstCommand,
     /// A requested variable does not exist.
@@ -69,7 +71,7 @@ pub enum ImportProblem {
     #[error("{0}")]
     Unusable(String),
     /// No usual name identifies u or y.
-    #[error("which variable is {what}? Say it with --{option} NAME; the file has {found}", what = .what, option = .option, found = .found)]
+    #[error("it is not clear which variable is {what}; name it with --{option} NAME; the file has {found}", what = .what, option = .option, found = .found)]
     Which {
         /// `the command u`, `the output y`.
         what: &'static str,
@@ -80,14 +82,15 @@ pub enum ImportProblem {
     },
     /// Neither a time column nor a sampling period.
     #[error(
-        "has no variable that is the time; name it with --t NAME, or give the sampling period with --period SECONDS; the file has {0}"
+        "has no time variable; name it with --t NAME, or give the sampling period with --period SECONDS; the \
+             file has {0}"
     )]
     NoTime(String),
     /// A scale that is 0 or not finite.
-    #[error("{0} has to be a finite number other than 0")]
+    #[error("{0} must be a finite number other than 0")]
     BadScale(&'static str),
     /// A threshold or an offset that is not finite.
-    #[error("{0} has to be a finite number")]
+    #[error("{0} must be a finite number")]
     BadNumber(&'static str),
     /// A threshold that the command never crosses.
     #[error("u lies between {low} and {high} and never crosses the threshold {threshold}; give one in between", low = .low, high = .high, threshold = .threshold)]
@@ -121,25 +124,27 @@ pub enum ImportProblem {
     },
     /// A folder that is a data set.
     #[error(
-        "is a data set already; give it to the other commands as it is, or name the files to import"
+        "is a data set already; pass it to the other commands directly, or name the files to import"
     )]
     IsDataSet,
     /// A folder without files to import.
     #[error(
-        "the folder holds no .csv, .tsv, .txt, .dat, .log, .mat, .npy or .npz file; name the files to import"
+        "the folder contains no .csv, .tsv, .txt, .dat, .log, .mat, .npy or .npz file; name the files to import"
     )]
     NothingInFolder,
     /// The output folder contains a data set.
-    #[error("holds a data set already; name another folder with -o, or replace it with --force")]
+    #[error("contains a data set already; name another folder with -o, or replace it with --force")]
     ReplacesSet,
     /// A file of the output exists already.
-    #[error("is there already; name another folder with -o, or replace the file with --force")]
+    #[error("exists already; name another folder with -o, or replace the file with --force")]
     ReplacesFile,
     /// A file of the output is one of the files that are read.
-    #[error("is read and would be replaced by its own import; name another folder with -o")]
+    #[error("is an input and would be replaced by its own import; name another folder with -o")]
     ReplacesSource,
     /// A data set that was not imported.
-    #[error("holds no [record.from]: it was not made by `host-fit import`; name one that was")]
+    #[error(
+        "contains no [record.from], so it was not made by `host-fit import`; name a data set that was"
+    )]
     NoMapping,
 }
 

@@ -8,7 +8,7 @@ use super::stamp::Stamped;
 use crate::error::{DataError, FilePlace, printable};
 use crate::memory;
 
-/// Bytes of memory that a column takes for each of its values, with its own copy in a record.
+/// Bytes of memory per value of a column, including its copy in a record.
 pub(super) const VALUE: u64 = 16;
 
 /// Memory used by reading so far.
@@ -18,7 +18,7 @@ pub(super) struct Budget {
 }
 
 impl Budget {
-    /// A budget with so many bytes already used.
+    /// A budget with this many bytes already used.
     pub(super) fn with(taken: u64) -> Self {
         Self { taken }
     }
@@ -35,7 +35,7 @@ impl Budget {
         Ok(())
     }
 
-    /// Reserves the memory of an array with so many values.
+    /// Reserves the memory of an array with this many values.
     pub(super) fn take_array(&mut self, name: &str, count: usize) -> Result<(), DataError> {
         let bytes = (count as u64).saturating_mul(VALUE);
         self.take(bytes, || format!("the array `{}`", printable(name)))
@@ -137,7 +137,7 @@ impl Source {
         &self.path
     }
 
-    /// The variable of this name, or of this heading: the name with its unit as it stands in the file, `Time (ms)`.
+    /// The variable of this name, or of this heading: the name with its unit as in the file, `Time (ms)`.
     pub(super) fn get(&self, name: &str) -> Option<&Variable> {
         let by = |test: &dyn Fn(&Variable) -> bool| self.variables.iter().find(|v| test(v));
         let (bare, unit) = name_and_unit(name);
@@ -195,7 +195,7 @@ impl Source {
         match (long.as_slice(), shape) {
             ([], _) => push(name.to_owned(), vec![at(0, 0)]),
             ([n], _) => {
-                // Length in whichever place, read along it.
+                // Length in either direction, read along it.
                 let along_rows = shape.first() == Some(n) || shape.len() == 1;
                 let value = |k| if along_rows { at(k, 0) } else { at(0, k) };
                 push(name.to_owned(), (0..*n).map(value).collect());

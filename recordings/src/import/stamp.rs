@@ -1,8 +1,8 @@
 //! Dates and clock times as loggers print them, and the seconds between them.
 //!
-//! Read are ISO 8601 (`2024-09-17T23:55:01.250Z`, with a blank for the `T`, with an offset), dates of day, month and year
-//! in either order or with the month's name, clock times with or without seconds, AM and PM, and durations
-//! (`0 days 00:00:01.5`). Days are counted in the proleptic Gregorian calendar, without leap seconds.
+//! Supported are ISO 8601 (`2024-09-17T23:55:01.250Z`, with a blank for the `T`, with an offset), dates of day,
+//! month and year in either order or with the month's name, clock times with or without seconds, AM and PM, and
+//! durations (`0 days 00:00:01.5`). Days are counted in the proleptic Gregorian calendar, without leap seconds.
 
 /// Seconds of a day.
 const DAY: f64 = 86_400.0;
@@ -49,7 +49,7 @@ pub(super) struct Stamped {
     pub(super) of_day: Vec<f64>,
     /// One unit in the last printed place of each, s.
     pub(super) unit: Vec<f64>,
-    /// How often midnight passes between clock times without a date.
+    /// Number of midnights between clock times without a date.
     pub(super) midnights: usize,
 }
 
@@ -62,7 +62,7 @@ impl Stamp {
         }
     }
 
-    /// The stamp in a cell; none if it is something else.
+    /// The stamp in a cell; `None` if it contains something else.
     pub(super) fn of(cell: &str) -> Option<Self> {
         let cell = cell.trim().trim_matches(['[', ']']);
         let is_short = (5..=48).contains(&cell.len());
@@ -107,7 +107,7 @@ impl Stamp {
         Self::of(cell).is_some_and(|stamp| stamp.kind() == Kind::Date)
     }
 
-    /// Whether a cell holds AM or PM alone.
+    /// Whether a cell contains only AM or PM.
     pub(super) fn is_half_of_day(cell: &str) -> bool {
         let words = HALVES.iter().flat_map(|(words, _)| words);
         words
@@ -143,7 +143,7 @@ fn parted(cell: &str) -> (Option<&str>, Option<&str>) {
         return (Some(cell), None);
     };
     let before = cell.get(..colon).unwrap_or_default();
-    // The hour is what stands before the first colon, back to a blank or the T of ISO 8601.
+    // The hour is the text before the first colon, back to a blank or the T of ISO 8601.
     let hour = before.trim_end_matches(|c: char| c.is_ascii_digit()).len();
     let date = before.get(..hour).unwrap_or_default();
     let date = date.trim_end_matches([' ', 'T', 't', ',', '_']);
@@ -203,8 +203,8 @@ fn month(text: &str) -> Option<u32> {
     is_word.then_some(at as u32 + 1)
 }
 
-/// Days since 1970-01-01; none where the calendar has no such day. The method is that of H. Hinnant,
-/// `chrono`-compatible low-level date algorithms (2013), `days_from_civil`.
+/// Days since 1970-01-01; `None` if the calendar has no such day. Method: H. Hinnant, `chrono`-compatible low-level
+/// date algorithms (2013), `days_from_civil`.
 fn days_from_civil(year: i32, month: u32, day: u32) -> Option<i64> {
     let leap = (year % 4 == 0 && year % 100 != 0) || year % 400 == 0;
     let longest = match month {
@@ -265,7 +265,7 @@ fn clock(text: &str) -> Option<(f64, f64)> {
     };
     let (mut hours, minutes, (seconds, unit)) = match parts.as_slice() {
         [hours, minutes, seconds] => (whole(hours)?, whole(minutes)?, fraction(seconds)?),
-        // A fraction can only be that of seconds.
+        // A fraction can only belong to the seconds.
         [minutes, seconds] if seconds.contains(['.', ',']) => {
             (0.0, whole(minutes)?, fraction(seconds)?)
         }

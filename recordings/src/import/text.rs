@@ -1,4 +1,4 @@
-//! Tables of numbers as text: whatever separates their columns, marks their decimals and precedes their rows.
+//! Tables of numbers as text, with any separator of columns, any decimal mark, and any lines before the rows.
 
 use std::collections::HashSet;
 
@@ -13,7 +13,7 @@ use crate::error::{DataError, DataProblem, FilePlace, printable};
 
 /// Most cells of a row: as many columns as a spreadsheet has.
 const WIDEST: usize = 16_384;
-/// Bytes of memory per line beside its text, and per cell: its value, its last place, and its copy in a
+/// Bytes of memory per line in addition to its text, and per cell: its value, its last place, and its copy in a
 /// record.
 const LINE: u64 = 32;
 const CELL: u64 = 24;
@@ -169,12 +169,12 @@ pub(super) fn variables(bytes: &[u8], budget: &mut Budget) -> Result<Source, Dat
     }
     if marks.is_unclear() {
         let as_what = match layout.is_parted_by_commas() {
-            true => "commas are taken for thousands marks",
-            false => "commas are taken for decimal commas",
+            true => "commas are read as thousands marks",
+            false => "commas are read as decimal commas",
         };
         source
             .remarks
-            .push(format!("{as_what}; the file does not show which"));
+            .push(format!("{as_what}; the file itself is ambiguous"));
     }
     let mut described: Vec<_> = names.into_iter().zip(units).zip(columns).collect();
     if stamps.is_some() && described.iter().all(|((name, _), _)| name != MONITOR) {
@@ -227,7 +227,7 @@ fn halves(layout: &Layout, lines: &[&str], rows: &[usize]) -> Option<usize> {
     all.then_some(column)
 }
 
-/// Indices of the lines that are rows; skipped lines are remarked.
+/// Indices of the lines that are rows; skipped lines are mentioned in a remark.
 fn rows(
     layout: &Layout,
     lines: &[&str],
@@ -244,7 +244,7 @@ fn rows(
         let found = layout.split(line, &mut cells);
         let is_last = at + 1 == lines.len() && is_cut;
         match found {
-            // A stopped program leaves half a line.
+            // A stopped program leaves an incomplete line.
             Line::Length(_) if is_last => others.push(at),
             Line::Row
                 if is_last && matches!(layout, Layout::Labelled(_)) && cells.contains(&"") =>
@@ -268,14 +268,14 @@ fn rows(
             more => format!(" ({more} more)"),
         };
         source.remarks.push(format!(
-            "line {} is no row and is left out: `{text}`{more}",
+            "line {} is not a row and is left out: `{text}`{more}",
             first + 1
         ));
     }
     Ok(rows)
 }
 
-/// UTF-8, UTF-16 with its mark, or else Latin-1, in which old instruments write `°C` and `µs`.
+/// UTF-8, UTF-16 with its mark, otherwise Latin-1, in which old instruments write `°C` and `µs`.
 fn decode(bytes: &[u8]) -> Result<String, DataError> {
     let wide = |from: fn([u8; 2]) -> u16| {
         let units = bytes.chunks_exact(2).skip(1).map(|b| from([b[0], b[1]]));
@@ -388,7 +388,7 @@ mod tests {
         assert_eq!(cut.lines, [2, 4]);
         assert_eq!(
             cut.remarks,
-            ["line 3 is no row and is left out: `# a break` (1 more)"]
+            ["line 3 is not a row and is left out: `# a break` (1 more)"]
         );
         let unclear = read("t;u\n0;1,021\n1;1,022\n");
         assert_eq!(unclear.variables[1].values, [1.021, 1.022]);
@@ -418,7 +418,7 @@ mod tests {
         };
         for (text, parts) in [
             ("t;u\n0;1\n1;1\n2\n", ["line 4", "2 names"]),
-            ("0;1\n1;HEAT\n", ["line 2", "`HEAT` is no number, date"]),
+            ("0;1\n1;HEAT\n", ["line 2", "`HEAT` is not a number, date"]),
             ("t;t\n0;1\n1;1\n", ["line 1, column `t`", "twice"]),
             ("nothing here", ["header", "no rows of numbers"]),
             ("t;u\n0;1\n1;1;3\n", ["header", "no rows"]),

@@ -13,7 +13,7 @@ const SINCE_1970: f64 = 1e9;
 
 /// The samples' times.
 pub(super) struct Timing<'a> {
-    /// The variables used for it; they are no channels.
+    /// The variables used for it, which are not channels.
     pub(super) variables: Vec<&'a Variable>,
     /// Time of the first sample, s.
     pub(super) t0: f64,
@@ -129,7 +129,7 @@ impl Mapping {
         })
     }
 
-    /// The time variable; none if the file has none or it is ignored.
+    /// The time variable; `None` if the file has none or it is ignored.
     fn time<'a>(
         &self,
         source: &'a Source,
@@ -173,7 +173,7 @@ impl Mapping {
         if let Some(unit) = &time.unit {
             let why = || {
                 format!(
-                    "the unit `{unit}` of the time is not known here; give the seconds in it with --t-scale"
+                    "the unit `{unit}` of the time is unknown; give its length in seconds with --t-scale"
                 )
             };
             let scale = seconds(unit)
@@ -240,7 +240,7 @@ fn stated_period(source: &Source) -> Option<f64> {
 
 /// Times in seconds, counted from `start`, which is in the file's unit.
 fn scaled(t: &Variable, start: f64, scale: f64) -> PrintedTimes {
-    // Division by 1000 is exact where multiplication by 0.001 is not.
+    // Division by 1000 is exact; multiplication by 0.001 is not.
     let whole = (1.0 / scale).round();
     let by = |v: f64| match (whole * scale - 1.0).abs() < 1e-12 && whole > 1.0 {
         true => v / whole,
@@ -266,7 +266,8 @@ fn scaled(t: &Variable, start: f64, scale: f64) -> PrintedTimes {
 fn explained(clock: &Clock, rounded: &Rounded, times: &PrintedTimes, source: &Source) -> String {
     let (span, steps) = times.span();
     let mut text = format!(
-        "times are printed in steps of {} s, so they step by {} to {} s; the sampling period is the mean, {} s / {steps} = {} s, and no sample is missing",
+        "times are printed in steps of {} s, so they step by {} to {} s. The sampling period is the mean, {} s \
+             / {steps} = {} s; no sample is missing",
         tidy(rounded.unit, 1e-6),
         tidy(rounded.shortest, 1e-6),
         tidy(rounded.longest, 1e-6),
@@ -277,7 +278,7 @@ fn explained(clock: &Clock, rounded: &Rounded, times: &PrintedTimes, source: &So
         && let Some(line) = source.lines.get(rounded.row)
     {
         text.push_str(&format!(
-            " (should one be missing before line {line}, the only uncommon step, split the file there)"
+            " (if a sample is missing before line {line}, the only uncommon step, split the file there)"
         ));
     }
     text

@@ -60,7 +60,7 @@ pub enum Gradings {
 /// All models.
 ///
 /// # Panics
-/// When a file of the project cannot be read.
+/// If a file of the project cannot be read.
 #[must_use]
 pub fn cases(gradings: Gradings) -> Vec<Case> {
     let mut cases = Vec::new();
@@ -130,7 +130,7 @@ pub fn cases(gradings: Gradings) -> Vec<Case> {
         model.add(definition.spec(), &middle(definition.spec()), reference);
         add(format!("own: {}", definition.spec().name), model);
     }
-    // Every function, comparison and kind of memory of the language of effects.
+    // Every function, comparison and kind of memory in the language of effects.
     let all = Definition::from_toml(ALL, "all.toml").expect("an effect");
     let mut model = base();
     model.define(all).expect("no other");

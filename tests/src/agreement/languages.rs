@@ -81,10 +81,10 @@ fn expected<T: model_core::Real>(case: &Case, vectors: &Vectors) -> Said {
     ]
 }
 
-/// Runs `cases` by `tool`, in files of `folder`.
+/// Runs `cases` with `tool`, in files of `folder`.
 ///
 /// # Errors
-/// When the tool refuses what was generated.
+/// If the tool refuses the generated file.
 pub fn run(tool: Tool, cases: &[Case], folder: &Path) -> Result<Vec<Row>> {
     let vectors: Vec<Vectors> = cases.iter().map(|case| Vectors::of(&case.model)).collect();
     for (i, vectors) in vectors.iter().enumerate() {
@@ -206,7 +206,7 @@ pub(super) fn output(command: &mut Command) -> Result<String> {
     Ok(String::from_utf8(done.stdout)?)
 }
 
-/// C99 as the page of exports promises it.
+/// C99 with the options that the page on exports states.
 pub(super) const C: [&str; 9] = [
     "-std=c99",
     "-O2",
@@ -229,7 +229,7 @@ const CORTEX_M4F: [&str; 6] = [
 const BOARD_START: &str = include_str!("board.c");
 const BOARD_MEMORY: &str = include_str!("board.ld");
 
-/// What case `i` says in C, and on a board the instructions of a sample.
+/// The output of case `i` in C, and on a board the instructions per sample.
 fn c(
     tool: Tool,
     case: &Case,

@@ -25,6 +25,6 @@ pub struct Row {
     pub difference: f64,
     /// Whether it is within the promised tolerance.
     pub agrees: bool,
-    /// Instructions of a sample, where a board ran it.
+    /// Instructions of a sample, if a board ran it.
     pub instructions: Option<f64>,
 }

@@ -1,4 +1,4 @@
-//! How long a million samples take in each language.
+//! The time of a million samples in each language.
 
 use super::Case;
 use super::languages::{C, Tool, output};
@@ -29,7 +29,7 @@ pub struct Pace {
 /// Times `case`, which has no channels, in files of `folder`; GCC is needed.
 ///
 /// # Errors
-/// When a tool refuses what was generated, or a language ends at another reading.
+/// If a tool refuses the generated file, or the languages end at different readings.
 pub fn pace(case: &Case, folder: &Path) -> Result<Pace> {
     let model = &case.model;
     let shares = || (0..SAMPLES).map(|k| f64::from(u8::from(k / 90 % 2 == 1)));
@@ -81,7 +81,7 @@ pub fn pace(case: &Case, folder: &Path) -> Result<Pace> {
     Ok(Pace { rust, c, python })
 }
 
-/// The shortest of the times that `program` prints before its last reading, which has to be `last`.
+/// The shortest of the times that `program` prints before its last reading, which must be `last`.
 fn shortest(program: impl Fn() -> Command, last: f64) -> Result<f64> {
     let mut least = f64::INFINITY;
     for _ in 0..RUNS {

@@ -79,7 +79,7 @@ fn main() -> Result<ExitCode> {
         }
     }
     println!(
-        "{} models, {failed} differences beyond what is promised",
+        "{} models, {failed} differences beyond the tolerance",
         cases.len()
     );
     Ok(if failed == 0 {

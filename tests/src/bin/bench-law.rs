@@ -31,15 +31,15 @@ const TIMES: HoldTimes = HoldTimes { on: 10, off: 10 };
 /// A run of a controller for a target on a bench.
 type Run = fn(&Bench, f64) -> Option<Figures>;
 
-/// What the plant has and the law's model has not.
+/// Physics of the plant that the law's model does not have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Unknown {
     Nothing,
-    /// The friction moves the other way first: a zero in the right half plane.
+    /// An inverse response: the friction first moves in the other direction (a zero in the right half plane).
     Reversal,
     /// A resonance at 25 Hz that the jets excite.
     Resonance,
-    /// A bubble that fills and takes the more from the level the fuller it is.
+    /// A bubble that fills and reduces the level, the more the fuller it is.
     Memory,
     /// Reading = full·(friction/full)^0.65: King's law with another exponent than the catalogue's.
     Film,
@@ -77,12 +77,12 @@ impl Unknown {
     }
 }
 
-/// A rig whose friction moves the other way first: less `depth` times the part of the jet that is younger than `time_s`.
+/// A rig with an inverse response: minus `depth` times the part of the jet that is younger than `time_s`.
 struct Reversing {
     rig: Rig,
     depth: f64,
     time_s: f64,
-    /// Commands on their way to the flow, the oldest first.
+    /// Commands in transport to the flow, the oldest first.
     coming: VecDeque<bool>,
     followed: f64,
     push: f64,
@@ -248,10 +248,9 @@ impl Bench {
         self.run(Relay::new(TIMES, 0.02), goal, goal)
     }
 
-    /// No controller at all: the square wave of that many switches per second, or
-    /// as many as the hold times leave room for, whose duty gives the goal on
-    /// average. Nothing at this rate ripples less: the flow moves by itself between
-    /// two switches, and even spacing is the least it can do.
+    /// No controller: a square wave with that many switches per second, or as many as the hold times permit, whose
+    /// duty gives the goal on average. No signal with this rate has less ripple, because the flow moves by itself
+    /// between two switches and even spacing minimises the ripple.
     fn floor(&self, goal: f64, switches_per_s: f64) -> Figures {
         let at = |frequency: f64| {
             let (mut low, mut high) = (0.0, 1.0);
@@ -413,11 +412,11 @@ fn hold_closely(benches: &[Bench], level: f64) {
     }
 }
 
-/// The law beside the best PI on plants with physics that the model lacks, as slow as the paper's.
+/// The law compared with the best PI on plants with physics that the model lacks, as slow as the paper's.
 fn beyond_the_model(level: f64) {
     let kinds = [
         (Unknown::Nothing, "the model's errors alone"),
-        (Unknown::Reversal, "first the other way, 0.3 for 20 ms"),
+        (Unknown::Reversal, "inverse response, 0.3 for 20 ms"),
         (Unknown::Resonance, "a resonance at 25 Hz, damping 0.05"),
         (Unknown::Memory, "a memory that saturates"),
         (Unknown::Film, "a film with exponent 0.65"),

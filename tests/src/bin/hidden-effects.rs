@@ -7,8 +7,8 @@ use scenarios::campaign::{Case, Given, Group, Ledger, Row, Sizes, calibration, c
 
 /// The diagnosis on rigs that hide something.
 ///
-/// One line a rig is kept in a file: a campaign that was stopped goes on where it was, and pieces of it can
-/// run one after the other. Rows belong to the program that made them; take a new file for a new program.
+/// The result of each rig is one line of a file. A stopped campaign continues there, and parts of it can run one
+/// after the other. Results belong to one version of the program: use a new file for a new version.
 #[derive(Debug, Parser)]
 #[command(name = "hidden-effects", args_override_self = true)]
 struct Arguments {
@@ -17,7 +17,7 @@ struct Arguments {
     /// Rigs for each effect and each family.
     #[arg(long, default_value_t = 1)]
     draws: u64,
-    /// Rigs for each effect in another law than the catalogue's.
+    /// Rigs for each effect with an altered equation.
     #[arg(long, default_value_t = 1)]
     altered: u64,
     /// Rigs without an effect, over all families, noises and nuisances.
@@ -38,7 +38,7 @@ struct Arguments {
     /// Multiple of the detectable size.
     #[arg(long, default_value_t = 1.0)]
     power_times: f64,
-    /// Prints error rates, coverage and power in place of the tables of findings.
+    /// Prints error rates, coverage and power instead of the tables of findings.
     #[arg(long)]
     calibration: bool,
     /// Given model: default (from `identify`), lean, truth, guess, bad-delays.
@@ -105,7 +105,7 @@ fn tell(row: &Row) {
         .map(|p| format!("{} {:.4} -> {:.4}", p.name, p.truth, p.found))
         .collect();
     eprintln!(
-        "{mark} {}: {} | {} -> {} x floor, {:.0} + {:.0} s | {}",
+        "{mark} {}: {} | {} -> {} x noise, {:.0} + {:.0} s | {}",
         row.key,
         row.said(),
         over(row.given_over_floor),

@@ -6,11 +6,11 @@ use clap::Parser;
 use scenarios::campaign::terms::{Row, Sizes, cases, run, table};
 use scenarios::campaign::{Case, Group, Ledger};
 
-/// The search for unknown terms on rigs with physics that the catalogue lacks, with effects that were taken out
-/// of the catalogue, and with nothing missing.
+/// The search for unknown terms on rigs with physics that the catalogue lacks, with effects that were removed from
+/// the catalogue, and without a missing effect.
 ///
-/// One line a rig is kept in a file: a campaign that was stopped goes on where it was, and pieces of it can
-/// run one after the other. Rows belong to the program that made them; take a new file for a new program.
+/// The result of each rig is one line of a file. A stopped campaign continues there, and parts of it can run one
+/// after the other. Results belong to one version of the program: use a new file for a new version.
 #[derive(Debug, Parser)]
 #[command(name = "hidden-terms")]
 struct Arguments {
@@ -75,7 +75,7 @@ fn tell(row: &Row) {
     let over = |over: Option<f64>| over.map_or("-".to_owned(), |over| format!("{over:.2}"));
     let share = |share: Option<f64>| share.map_or("-".to_owned(), |s| format!("{:.0}", 100.0 * s));
     eprintln!(
-        "{mark} {}: {} | {} -> {} -> {} x floor | taken % {} {} truly {} | {:.0} + {:.0} s",
+        "{mark} {}: {} | {} -> {} -> {} x noise | explained % {} {} true {} | {:.0} + {:.0} s",
         row.key,
         row.said(),
         over(row.given_over_floor),

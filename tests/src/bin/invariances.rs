@@ -6,8 +6,8 @@ use std::time::Duration;
 use clap::Parser;
 use scenarios::invariances::{Broken, Change, Options, run};
 
-/// Changes of records that must not change the answer: scale and level of y, of u, of the clock, rest in front, records
-/// cut, reordered, renamed. Exit code 1 if one does.
+/// Changes of records that must not change the answer: scale and level of y, of u, of the clock, additional rest at
+/// the start, records cut, reordered, renamed. Exit code 1 if one of them changes it.
 #[derive(Debug, Parser)]
 #[command(name = "invariances")]
 struct Arguments {
@@ -17,10 +17,10 @@ struct Arguments {
     /// The first rig.
     #[arg(long, default_value_t = 0)]
     seed: u64,
-    /// Use the records of `tests/data/strangers` in place of rigs.
+    /// Use the records of `tests/data/strangers` instead of simulated rigs.
     #[arg(long)]
     strangers: bool,
-    /// Run `diagnose` on every so-many-th rig; 0 for none.
+    /// Run `diagnose` on every N-th rig; 0 for none.
     #[arg(long, value_name = "COUNT", default_value_t = 10)]
     diagnose_every: u64,
     /// Only this change: output, command, inverted, clock, rest, cut, order, names; repeatable.

@@ -39,7 +39,8 @@ fn main() -> anyhow::Result<()> {
     {
         for line in text.lines() {
             rows.push(
-                serde_json::from_str(line).context("a row of another program; take a new file")?,
+                serde_json::from_str(line)
+                    .context("a row of another version of the program; use a new file")?,
             );
         }
     }

@@ -1,7 +1,6 @@
-//! Faults on the line, under QEMU: garbage, half frames, a host that dies, two of
-//! them, a board that is reset. (A host that does not read is in the firmware's
-//! tests: QEMU itself stands still when nobody reads its line.) The valve ends shut,
-//! and no sample is lost unnoticed. `cargo xtask faults` runs it with the board's program.
+//! Faults on the line, under QEMU: garbage, half frames, a host that stops, two hosts, a board that is reset. (The
+//! firmware's tests cover a host that does not read, because QEMU stops if its line is not read.) The valve ends
+//! closed, and no sample is lost undetected. `cargo xtask faults` runs it with the board's program.
 
 use anyhow::{Context, Result, bail, ensure};
 use rig_line::alarm::Test;
@@ -13,8 +12,8 @@ use rig_line::{Command, Event, Host, LineError, word};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-/// Samples until the flow answers the valve, and those of its lag: near the bundled models, whose residual
-/// would shut the valve otherwise.
+/// Samples of the flow's dead time, and of its lag. They are close to the bundled models; otherwise the residual
+/// would close the valve.
 const DEAD_TIME: usize = 50;
 const LAG: f64 = 150.0;
 
@@ -52,12 +51,12 @@ type Fault = (&'static str, fn(Bench) -> Result<String>);
 /// Runs those alone that depend on the period of the loop.
 const TIMED: &str = "--timed";
 const FAULTS: [Fault; 6] = [
-    ("a host that dies in mid-command", dead),
-    ("no fault: the law, watched", watched),
+    ("a host that stops during a command", dead),
+    ("no fault: the law is watched", watched),
     ("garbage and half frames", garbage),
     ("two hosts", two),
-    ("a board that is reset in mid-record", reset),
-    ("a disarm typed among frames", typed),
+    ("a board that is reset during a recording", reset),
+    ("a disarm typed between frames", typed),
 ];
 /// How many of [`FAULTS`], from the first, depend on the period of the loop.
 const OF_THE_PERIOD: usize = 2;
@@ -92,7 +91,7 @@ fn begin(bench: &mut Bench, runs: &[u32]) -> Result<()> {
     Ok(())
 }
 
-/// Counts of a stream: samples, missing samples by number, and those that the board counted itself.
+/// Counts of a stream: samples, missing samples by number, and missing samples that the board counted.
 fn count(
     bench: &mut Bench,
     while_at_it: &mut dyn FnMut(&mut Host, u32) -> Result<()>,
@@ -162,10 +161,10 @@ fn garbage(mut bench: Bench) -> Result<String> {
         "{came} {missing} {left_out}"
     );
     let damaged = bench.host.hello()?.damaged;
-    ensure!(damaged > 20, "{damaged} damaged frames were noticed");
+    ensure!(damaged > 20, "{damaged} damaged frames were detected");
     shut(&mut bench)?;
     Ok(format!(
-        "{sent} bytes of it, {damaged} damaged frames noticed, all {came} samples came"
+        "{sent} bytes of it, {damaged} damaged frames detected, all {came} samples received"
     ))
 }
 
@@ -184,7 +183,7 @@ fn dead(mut bench: Bench) -> Result<String> {
     let phase = word(bench.host.hello()?.phase);
     ensure!(phase == "link", "{phase}");
     Ok(format!(
-        "the valve is shut {after} samples after its beginning, fault={phase}"
+        "the valve is closed {after} samples after its beginning, fault={phase}"
     ))
 }
 
@@ -241,7 +240,7 @@ fn reset(mut bench: Bench) -> Result<String> {
     );
     shut(&mut bench)?;
     Ok(format!(
-        "{}; six whole repeats in two goes",
+        "{}; six complete repeats in two parts",
         recording.parts[0].ended
     ))
 }
@@ -258,7 +257,9 @@ fn typed(mut bench: Bench) -> Result<String> {
     })?;
     ensure!(missing == 0 && came < 2000, "{came} {missing}");
     shut(&mut bench)?;
-    Ok(format!("shut after {came} samples, and the stream says so"))
+    Ok(format!(
+        "closed after {came} samples, as the stream reports"
+    ))
 }
 
 /// Four thousand samples of the law on a plant that differs from its model.

@@ -1,5 +1,5 @@
-//! `cargo xtask pil` calls this: once for the constants that the board is to be
-//! built with, and once, with the board's program, for the run in lockstep.
+//! Called by `cargo xtask pil`: once for the constants with which the board is built, and once, with the board's
+//! program, for the lockstep run.
 
 use anyhow::{Context, Result};
 use clap::Parser;
@@ -40,7 +40,7 @@ enum Task {
         /// Steps of every case.
         #[arg(long)]
         steps: Option<usize>,
-        /// Drop one byte in so many, to test error detection; 0 for none.
+        /// Drop one byte in this many, to test error detection; 0 for none.
         #[arg(long, default_value_t = 997)]
         lose: usize,
         /// Only this case.
@@ -136,7 +136,7 @@ fn run(
         most.insert(&case.name, f64::from(report.most) * per_tick);
     }
     println!(
-        "link: {} bytes lost on purpose, {} requests repeated, none slipped; {:.1} s",
+        "link: {} bytes lost on purpose, {} requests repeated, no wrong answer; {:.1} s",
         link.lost,
         link.repeated,
         started.elapsed().as_secs_f64()

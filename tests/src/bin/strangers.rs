@@ -7,23 +7,24 @@ use std::time::Duration;
 use clap::Parser;
 use scenarios::strangers::{Options, Row, Step, by_kind, drawn, json, run, table};
 
-/// Every set beside the three baselines: samples scored, FIT, verdict, delay, seconds, and whether that is right.
+/// Every set compared with the three baselines: scored samples, FIT, verdict, delay, seconds, and whether the
+/// result is right.
 ///
-/// The sets of the project, or those of the folders that are named: a set is a folder with `expected.toml`, or with
-/// `*_train*.csv` and `*_test*.csv`. Exit code 1 if anything is wrong.
+/// The project's sets, or those of the named folders. A set is a folder with `expected.toml`, or with
+/// `*_train*.csv` and `*_test*.csv`. Exit code 1 if a result is wrong.
 #[derive(Debug, Parser)]
 #[command(name = "strangers")]
 struct Arguments {
     /// A folder of sets; repeatable.
     #[arg(long, value_name = "DIR")]
     folder: Vec<PathBuf>,
-    /// Draw so many sets from the seed, sixteen kinds in turn, and run those.
+    /// Draw this many sets from the seed, sixteen kinds in turn, and run them.
     #[arg(long, value_name = "COUNT", conflicts_with = "folder")]
     drawn: Option<usize>,
     /// Seed of the drawn sets.
     #[arg(long, default_value_t = 1, requires = "drawn")]
     seed: u64,
-    /// Folder for the drawn sets, which stay there.
+    /// Folder for the drawn sets, which are kept there.
     #[arg(
         long,
         value_name = "DIR",
@@ -37,7 +38,7 @@ struct Arguments {
     /// Print one JSON document.
     #[arg(long)]
     json: bool,
-    /// Also `extend` and `discover`, and `compare` of the files that they write.
+    /// Also `extend` and `discover`, and `compare` with the files that they write.
     #[arg(long)]
     all: bool,
     /// Leave out this command; repeatable.

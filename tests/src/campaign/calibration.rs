@@ -11,10 +11,11 @@ use super::row::{Found, Row};
 #[must_use]
 pub fn calibration(seed: u64, rows: &[Row]) -> String {
     let mut text = format!(
-        "# Calibration: what a name is worth\n\n\
-         Written by `cargo xtask calibrate` from {} rigs of seed {seed} ([rigs.md](rigs.md)), each of them identified \
-         and diagnosed as a user would; bounds are Wilson's, with 95 % confidence. What each line means, and what is \
-         done about it: [hidden-effects.md](hidden-effects.md).\n\n| | reached | goal |\n|---|---|---|\n",
+        "# Calibration: error rates of the diagnosis\n\n\
+         Written by `cargo xtask calibrate` from {} simulated rigs of seed {seed} ([rigs.md](rigs.md)). Each rig was \
+         identified and diagnosed with the default options. Bounds are Wilson's, with 95 % confidence. \"Altered \
+         equations\": the hidden effect obeys another equation than that of the catalogue. The method: \
+         [hidden-effects.md](hidden-effects.md).\n\n| | reached | goal |\n|---|---|---|\n",
         rows.len()
     );
     let of = |group: Group| -> Vec<&Row> {
@@ -27,49 +28,55 @@ pub fn calibration(seed: u64, rows: &[Row]) -> String {
         let _ = writeln!(text, "| {what} | {reached} | {goal} |");
     };
     line(
-        "named although nothing is missing",
+        "an effect is named although nothing is missing",
         share(&nothing, |row| !row.named().is_empty()),
         "≤ 3 % of ≥ 300",
     );
     line(
-        "said to be unexplained, or in part, although nothing is missing",
+        "verdict `unexplained` or `partly-explained` although nothing is missing",
         share(&nothing, |row| {
             matches!(row.verdict.as_str(), "unexplained" | "partly-explained")
         }),
         "–",
     );
     for (what, rows, inside, wrong) in [
-        ("exact laws", &exact, "≥ 97 %", "≤ 1 %"),
-        ("altered laws", &altered, "≥ 95 %", "≤ 5 %"),
+        ("exact equations", &exact, "≥ 97 %", "≤ 1 %"),
+        ("altered equations", &altered, "≥ 95 %", "≤ 5 %"),
     ] {
         let named: Vec<&Row> = (rows.iter().copied())
             .filter(|row| !row.missing.is_empty())
             .collect();
         line(
-            &format!("the truth in one of the stated sets, where something is named, {what}"),
+            &format!(
+                "the true effect is in a stated equivalence set, where an effect is named, {what}"
+            ),
             share(&named, Row::is_in_set),
             inside,
         );
         let sizes = named.iter().flat_map(|row| &row.sets).map(Vec::len);
         line(
-            &format!("median size of the sets, {what}"),
+            &format!("median size of the equivalence sets, {what}"),
             median(sizes.collect()).map(|size| size.to_string()),
-            if what == "exact laws" { "1" } else { "≤ 2" },
+            if what == "exact equations" {
+                "1"
+            } else {
+                "≤ 2"
+            },
         );
         line(
-            &format!("a wrong name alone in its set, {what}"),
+            &format!("a wrong effect is named, and the true one is not in its set, {what}"),
             share(rows, |row| !row.wrong_alone().is_empty()),
             wrong,
         );
     }
     line(
-        "nothing named, or nothing but stand-ins, where an effect is missing, exact laws",
+        "an effect is missing, and none or only surrogates are reported, exact equations",
         share(&exact, |row| row.missing.is_empty()),
         "–",
     );
     let with_effect: Vec<&Row> = exact.iter().chain(&altered).copied().collect();
     line(
-        "extra names",
+        "a needless additional effect is named",
         share(&with_effect, |row| !row.needless().is_empty()),
         "≤ 5 % of runs",
     );
@@ -82,12 +89,12 @@ pub fn calibration(seed: u64, rows: &[Row]) -> String {
         })
         .collect();
     line(
-        "put in as large as is said to be seen with 80 % power: named",
+        "effects of the size stated as detectable with 80 % power: named",
         share(&seen, Row::is_found),
         "70–90 %",
     );
-    // Edge-dependent delays or a drift are true effects; a state-dependent delay belongs to the base. If a
-    // true property is named anyway, p belongs to it.
+    // Edge-dependent delays or a drift are true effects of the rig; a state-dependent delay belongs to the base. If
+    // such a true effect is named, p belongs to it.
     let in_the_base = |row: &&&Row| {
         let mut others = row.also_right.iter();
         let truly_named = !row.missing.is_empty() && row.named().is_empty();
@@ -95,7 +102,7 @@ pub fn calibration(seed: u64, rows: &[Row]) -> String {
     };
     let bare: Vec<&Row> = nothing.iter().filter(in_the_base).copied().collect();
     line(
-        "p ≤ 0.05 of the whole search where nothing is missing",
+        "family-wise p ≤ 0.05 although nothing is missing",
         share(&bare, |row| row.p_value.is_some_and(|p| p <= 0.05)),
         "3–7 %",
     );
@@ -107,13 +114,13 @@ pub fn calibration(seed: u64, rows: &[Row]) -> String {
     for (kind, all) in &kinds {
         let covered = all.iter().filter(|found| found.is_covered() == Some(true));
         line(
-            &format!("95 % intervals that hold the truth, {kind}"),
+            &format!("95 % intervals that contain the true value, {kind}"),
             Some(bounded(covered.count(), all.len())),
             "92–97 %",
         );
     }
     if !seen.is_empty() {
-        text += "\n## Put in as large as is said to be seen\n\n| effect | named | said instead |\n|---|---|---|\n";
+        text += "\n## Effects of the size stated as detectable\n\n| effect | named | otherwise reported |\n|---|---|---|\n";
         let mut effects: BTreeMap<&str, Vec<&Row>> = BTreeMap::new();
         for row in &seen {
             effects.entry(&row.label).or_default().push(row);
@@ -136,7 +143,7 @@ pub fn calibration(seed: u64, rows: &[Row]) -> String {
     let failed = rows.iter().filter(|row| row.failure.is_some());
     let failed: Vec<&Row> = failed.collect();
     if !failed.is_empty() {
-        text += "\n## Without an answer\n\n";
+        text += "\n## Cases without a verdict\n\n";
         for row in failed {
             let _ = writeln!(text, "- `{}`: {}", row.key, row.said());
         }

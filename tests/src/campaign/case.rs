@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 pub enum Group {
     /// One effect of the catalogue.
     Single,
-    /// One effect in another law than the catalogue's.
+    /// One effect with an equation other than the catalogue's.
     Altered,
     /// No effect: noise and nuisances only.
     Nothing,
@@ -246,7 +246,7 @@ impl Seeds {
     }
 }
 
-/// One rig in so many with an on/off effect has a graded command nevertheless.
+/// One rig in this many with an on/off effect has a graded command nevertheless.
 const GRADED: u32 = 8;
 
 /// The cases of a campaign in random order, so that any first part is a sample of all. Every rig has its own
@@ -270,7 +270,7 @@ pub fn cases(sizes: &Sizes, given: Given, seed: u64) -> Vec<Case> {
         }
         all.push(case);
     };
-    // Over the rounds every effect meets every family.
+    // Over the rounds every effect is combined with every family.
     let families = Family::ALL.len();
     let turn = |round: u64, index: usize| Family::ALL[(round as usize + index) % families];
 
@@ -356,8 +356,8 @@ pub(super) fn nothing(number: u64, seed: u64) -> Case {
     case
 }
 
-/// Effects that need levels between off and on are used on the first-order flow only, because the response of
-/// the others to jets of part strength is undefined.
+/// Effects that need levels between off and on are used on the first-order flow only, because for the other flows
+/// the response to jets of part strength is undefined.
 fn shows(name: &str, family: Family) -> bool {
     on_off(name) || family == Family::FirstOrder
 }
@@ -373,7 +373,7 @@ fn has_amplitude(name: &str) -> bool {
 fn on_off(name: &str) -> bool {
     let mut rng = ChaCha8Rng::seed_from_u64(0);
     let base = firmware_sim::plant::BasePlant::draw(&mut rng);
-    // Effects with other laws are all visible.
+    // Effects with altered equations are all visible.
     let effect = Effect::draw(name, &base, &mut rng);
     effect.is_ok_and(|effect| effect.shows_with() == ShowsWith::OnOff)
         || Altered::NAMES.contains(&name)

@@ -31,13 +31,13 @@ pub struct Ledger {
     /// Seed of the campaign.
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
-    /// Only cases with this in their key, as `memory1/` or `/hot-film-lag/`.
+    /// Only cases with this text in their key, such as `memory1/` or `/hot-film-lag/`.
     #[arg(long, default_value = "")]
     only: String,
     /// Every N-th case from the I-th on, as 1/4.
     #[arg(long, default_value = "1/1", value_parser = part)]
     part: (usize, usize),
-    /// Only the first so many of these cases; the order is random.
+    /// Only this many of these cases, from the start; the order is random.
     #[arg(long)]
     first: Option<usize>,
     /// Cases that run in parallel. With two or more the whole is faster, but wall-clock times differ from a
@@ -50,7 +50,7 @@ pub struct Ledger {
     /// Folder for every unsuccessful case: data set, answer, models, documents.
     #[arg(long)]
     keep: Option<PathBuf>,
-    /// The program to test; by default the one beside this one.
+    /// The program to test; by default the one in the same folder as this program.
     #[arg(long)]
     program: Option<PathBuf>,
     /// Only print the tables of existing results.

@@ -1,9 +1,9 @@
-//! Campaigns: rigs of every family that hide something, the program that is told nothing, and the count of
-//! what it found.
+//! Campaigns: simulated rigs of every family with hidden effects, the diagnosis of them without further
+//! information, and the count of its results.
 //!
-//! Each case is a data set in a folder, `host-fit identify` and then `host-fit diagnose --json` (hidden
-//! effects) or `host-fit discover --json` (hidden terms) with the model that it writes: what a user would do,
-//! with what a user would get. One line of JSON a case is kept in a file.
+//! Each case is a data set in a folder, then `host-fit identify`, then `host-fit diagnose --json` (hidden effects)
+//! or `host-fit discover --json` (hidden terms) with the identified model. These are the steps of a user. The
+//! result of each case is one line of JSON in a file.
 
 mod calibration;
 mod case;

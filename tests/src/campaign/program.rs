@@ -9,7 +9,7 @@ use host_fit::data::{DataSet, Record};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-/// How long a run of the program took.
+/// Duration of a run of the program.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Spent {
     /// Wall-clock time (s).
@@ -29,7 +29,8 @@ pub struct Program {
     pub threads: usize,
     /// Folder for unsuccessful cases (data set, answer, models, documents); none to discard them.
     pub keep: Option<PathBuf>,
-    /// The part of a rig's records that it is given; all if none. A pinned decision is cheaper on a part that shows it.
+    /// The part of a rig's records that is used; all if `None`. A fixed decision can be tested faster on a part
+    /// that suffices for it.
     pub part: Option<Part>,
 }
 
@@ -38,19 +39,19 @@ pub struct Program {
 pub struct Part {
     /// These records, by their place …
     pub records: &'static [usize],
-    /// … of each so many samples from the start.
+    /// … of each this many samples from the start.
     pub samples: usize,
 }
 
 impl Part {
-    /// Two squares and a telegraph to learn from, a square and a telegraph held out: of eight records of 10 s a third of
-    /// the samples, and of the time.
+    /// For estimation two square waves and a random on/off command, for validation one of each: a third of the
+    /// samples of eight records of 10 s, and a third of the time.
     pub const THIRD: Self = Self {
         records: &[1, 2, 4, 5, 7],
         samples: 5000,
     };
 
-    /// The part of `set`, which must have the records that are named.
+    /// The part of `set`, which must contain the named records.
     #[must_use]
     pub fn of(self, set: &DataSet) -> Vec<Record> {
         let records = self.records.iter();
@@ -137,7 +138,7 @@ const TICKS_PER_SECOND: f64 = 100.0;
 /// Processor time of a process so far, all threads; none without `/proc`.
 fn cpu_seconds(process: u32) -> Option<f64> {
     let text = fs::read_to_string(format!("/proc/{process}/stat")).ok()?;
-    // The second field, the name, may hold blanks; the times are the 14th and 15th.
+    // The second field, the name, may contain blanks; the times are the 14th and 15th.
     let (_, fields) = text.rsplit_once(')')?;
     let mut times = fields.split_whitespace().skip(11);
     let mut ticks = || times.next()?.parse::<f64>().ok();

@@ -74,8 +74,8 @@ pub struct Row {
     pub hidden: Vec<String>,
     /// Further correct names.
     pub also_right: Vec<String>,
-    /// Whether the flow has a second lag, which is equivalent to a lag of the film: a film lag in a set with
-    /// `flow-lag` is correct, one that is named alone is not.
+    /// Whether the flow has a second lag, which is equivalent to a film lag: a film lag in a set with `flow-lag` is
+    /// correct, one named alone is not.
     #[serde(default)]
     pub flow_lag: bool,
     /// The verdict, or `failed` with the reason in `failure`.
@@ -83,7 +83,7 @@ pub struct Row {
     /// Why there is no diagnosis.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub failure: Option<String>,
-    /// The effects named, in their order, and those certified beside something unexplained.
+    /// The named effects in their order, and those certified although another error remains.
     pub missing: Vec<String>,
     /// Equivalence set of each of them.
     #[serde(default)]

@@ -1,4 +1,4 @@
-//! Runs a case as a user would: a folder, `identify`, `diagnose`, the written model.
+//! Runs a case like a user: a folder, `identify`, `diagnose`, the written model.
 
 use std::fs;
 use std::path::Path;
@@ -167,7 +167,7 @@ fn just_seen(
     let name = case.hidden.first().ok_or("no effect to put in")?;
     let (document, ..) = asked(case, plan, program, folder)?;
     if verdict(&document)? != "nothing-missing" {
-        return Err("something is said to be missing on the rig without it".to_owned());
+        return Err("an effect is reported on the rig without it".to_owned());
     }
     let said = document["detectable"].as_array().into_iter().flatten();
     let own = said.clone().find(|entry| entry["effect"] == name.as_str());
@@ -186,7 +186,7 @@ fn just_seen(
     let card = model_core::effects::spec(name).and_then(|spec| spec.amplitude);
     let card = card.ok_or("the effect has no amplitude")?;
     for (parameter, value) in effect.parameters().iter().zip(values) {
-        let mut value = value.as_f64().ok_or("a parameter is no number")?;
+        let mut value = value.as_f64().ok_or("a parameter is not a number")?;
         if card.together || parameter.name == card.parameter {
             value *= case.times;
         }

@@ -217,7 +217,7 @@ fn totals(rows: &[Row]) -> String {
         &single,
         &Row::is_in_set,
     );
-    let floor = format!("held-out error at most {AT_FLOOR} x noise floor");
+    let floor = format!("validation error at most {AT_FLOOR} x the noise level");
     line(&floor, &single, &Row::is_at_floor);
     line("needless effects named", &single, &|row| {
         !row.needless().is_empty()

@@ -1,8 +1,8 @@
-//! Mutated input for everything that reads what others wrote, in this process and on a stable compiler.
+//! Mutated input for every reader of foreign files, in this process and with a stable compiler.
 //!
-//! There is no count of branches to be led by. What a target says of an input (its message without the numbers in it) takes
-//! its place: an input of which something new is said is kept and mutated further. What once broke something stands in
-//! `tests/data/fuzz/TARGET` and is tried by a test.
+//! Branches are not counted. The response of a target to an input (its message without the numbers in it) is used
+//! instead: an input with a new response is kept and mutated further. Inputs that once caused a failure are in
+//! `tests/data/fuzz/TARGET` and are tried by a test.
 
 mod mutate;
 mod targets;

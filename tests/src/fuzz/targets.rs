@@ -330,7 +330,7 @@ fn model(input: &[u8]) -> String {
         true => model.run_free(&Signals::commanded(&model, &u)).is_ok(),
         false => false,
     };
-    // The golden run of a long memory is slow.
+    // The reference run of a long memory is slow.
     if model.longest_lag().max(model.longest_delay()) > 500 {
         return format!("long, ran {ran}");
     }
@@ -418,7 +418,7 @@ fn frames() -> Vec<Vec<u8>> {
     seeds
 }
 
-/// Bytes from the line to either end, and the same bytes as the content of a valid frame, since a checksum
+/// Bytes from the line to either end, and the same bytes as the content of a valid frame, because the checksum
 /// would reject them otherwise.
 fn framed(input: &[u8]) -> String {
     let mut receiver = Receiver::new();

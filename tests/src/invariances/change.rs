@@ -1,4 +1,4 @@
-//! Changes of records that do not change what they tell.
+//! Changes of records that do not change their information.
 
 use super::records::{Base, Part, normal};
 use rand::RngExt;
@@ -40,7 +40,7 @@ impl Change {
         Self::Names,
     ];
 
-    /// The change by its name, as an option has it.
+    /// The change by its name, as in the option.
     #[must_use]
     pub fn named(word: &str) -> Option<Self> {
         let all = [
@@ -65,12 +65,12 @@ impl Change {
         }
     }
 
-    /// Whether the records are others, so that estimates differ by their scatter.
+    /// Whether the samples differ, so that estimates differ by their scatter.
     pub(super) fn changes_samples(self) -> bool {
         matches!(self, Self::Rest | Self::Cut)
     }
 
-    /// The changed records, by what errors are multiplied, and the numbers of the change.
+    /// The changed records, the factor on errors, and the numbers of the change.
     pub(super) fn applied(self, base: &Base, random: &mut ChaCha8Rng) -> (Vec<Part>, f64, String) {
         let records = &base.parts;
         let mut changed = records.clone();
@@ -100,7 +100,7 @@ impl Change {
             }),
             Self::Clock => {
                 let period_s = 10f64.powf(random.random_range(-4.0..60f64.log10()));
-                // Three digits, as a person would say it.
+                // Three digits, for messages.
                 let period_s: f64 = format!("{period_s:.2e}").parse().unwrap_or(0.001);
                 each(&mut changed, |part| part.period_s = period_s);
                 words = format!("{period_s} s a sample");

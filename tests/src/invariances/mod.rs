@@ -1,20 +1,20 @@
-//! Invariances: what does not change the answer of the program, on rigs that are drawn at random and on
-//! records of strangers.
+//! Invariances: changes of the records that do not change the answer of the program, on simulated rigs drawn at
+//! random and on records from other loggers.
 //!
 //! | change | the answer |
 //! |---|---|
 //! | y → a·y + b, \|b\| up to 100 × the range | the same, errors times \|a\| |
 //! | u → α·u + β, also inverted | the same |
 //! | t → c·t, 0.1 ms to 60 s a sample | the same in samples |
-//! | rest added in front | the same within the scatter, or a near tie |
+//! | rest added before the record | the same within the scatter, or a near tie |
 //! | records cut anywhere, or joined | the same within the scatter, or a near tie |
 //! | records reordered, or renamed | the same to the last digit |
 //!
-//! The answer is verdict and names of `diagnose`, structure and delay of the model, FIT, error and poles, and the delays
-//! that `delay` measures.
+//! The answer consists of verdict and names of `diagnose`, structure and delay of the model, FIT, error and poles,
+//! and the delays that `delay` measures.
 //!
-//! A near tie are two models of different structure of which each describes the other's records as well as the other does,
-//! within 2 % of the error: records with other samples may prefer either. Near ties are counted beside what is broken.
+//! A near tie: two models of different structure each describe the other's records equally well, within 2 % of the
+//! error. Records with other samples may then prefer either. Near ties are counted separately from failures.
 
 mod change;
 mod records;
@@ -38,15 +38,15 @@ pub struct Options {
     pub cases: u64,
     /// The first rig.
     pub seed: u64,
-    /// Records of strangers in place of drawn rigs.
+    /// Records from other loggers instead of simulated rigs.
     pub strangers: bool,
-    /// `diagnose` is asked of every so-many-th rig; 0 for none.
+    /// `diagnose` is run on every N-th rig; 0 for none.
     pub diagnose_every: u64,
     /// The changes that are tried; all if empty.
     pub only: Vec<Change>,
-    /// After how long a command is stopped.
+    /// Time limit of a command.
     pub limit: Duration,
-    /// Rigs that are asked of side by side.
+    /// Number of rigs that run in parallel.
     pub jobs: usize,
 }
 
@@ -61,7 +61,7 @@ impl Options {
 pub struct Broken {
     /// What was changed.
     pub change: Change,
-    /// Seed of the rig: `--seed` of it alone shows it again.
+    /// Seed of the rig: `--seed` with it alone repeats the rig.
     pub seed: u64,
     /// The rig and the change with their numbers.
     pub rig: String,
@@ -74,14 +74,14 @@ pub struct Broken {
 pub struct Outcome {
     /// The changes, and on how many rigs each was tried.
     pub tried: Vec<(Change, u64)>,
-    /// Those that made a difference, in the order of seeds.
+    /// Changes that made a difference, in the order of seeds.
     pub broken: Vec<Broken>,
-    /// Those after which another structure describes all records equally well.
+    /// Changes after which another structure describes all records equally well.
     pub near_ties: Vec<Broken>,
 }
 
 impl Outcome {
-    /// A line for each change: how often it broke and ended in a near tie; each of these below it.
+    /// A line for each change with the numbers of failures and near ties, and each of these below it.
     #[must_use]
     pub fn table(&self) -> String {
         let mut text = String::from("| change | broken | near ties |\n|---|---|---|\n");
@@ -106,7 +106,7 @@ impl Outcome {
     }
 }
 
-/// Tries every change on every rig; `tell` hears of each that made a difference as it comes.
+/// Tries every change on every rig; `tell` receives each that made a difference when it occurs.
 ///
 /// # Errors
 /// No temporary folder.

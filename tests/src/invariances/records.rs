@@ -1,4 +1,4 @@
-//! Rigs that are drawn at random, and their records.
+//! Rigs drawn at random, and their records.
 
 use crate::strangers::bundled_cases;
 use host_fit::data::DataSet;
@@ -40,7 +40,7 @@ pub(super) struct Part {
 }
 
 impl Part {
-    /// The mean of y before the command first changes: a single sample is off by its noise.
+    /// The mean of y before the command first changes, because a single sample has its noise.
     pub(super) fn level_at_rest(&self) -> f64 {
         let changes = self.u.windows(2).position(|pair| pair[0] != pair[1]);
         let rest = self.y.get(..=changes.unwrap_or(0)).unwrap_or(&self.y);
@@ -89,7 +89,7 @@ impl Rig {
     }
 }
 
-/// A rig and three records of it, the last held out, 1 ms a sample.
+/// A rig and three records of it, the last for validation, 1 ms per sample.
 pub(super) fn draw(random: &mut ChaCha8Rng) -> Base {
     let off = random.random_range(20.0..70.0);
     let linear = random.random_bool(0.5);
@@ -134,7 +134,7 @@ pub(super) fn draw(random: &mut ChaCha8Rng) -> Base {
     }
 }
 
-/// The records of strangers that begin at rest, with an on/off command, one base for each case.
+/// The records from other loggers that begin at rest, with an on/off command; one set per case.
 pub(super) fn strangers() -> Vec<Base> {
     const SETS: [&str; 5] = [
         "bump-test",
@@ -163,7 +163,8 @@ pub(super) fn strangers() -> Vec<Base> {
         let bends = y.windows(3).map(|y| (y[0] - 2.0 * y[1] + y[2]).abs());
         let mut bends: Vec<f64> = bends.collect();
         bends.sort_by(f64::total_cmp);
-        // A slope has no part in it; of normal numbers the standard deviation is √6 times theirs, the median 0.674 of it.
+        // A slope does not contribute. For normal noise the standard deviation of second differences is √6 times
+        // that of a sample, and their median 0.674 of it.
         let noise = bends.get(bends.len() / 2)? / (0.674 * 6f64.sqrt());
         Some(Base {
             words: format!("{} {}", case.set, case.name),

@@ -1,4 +1,4 @@
-//! The answer of the program to a data set, and what differs between two.
+//! The answer of the program to a data set, and the differences of two answers.
 
 use super::Change;
 use super::records::Part;
@@ -8,7 +8,7 @@ use serde_json::Value;
 use std::path::Path;
 use std::time::Duration;
 
-/// Differences below these shares are rounding where the samples are the same, scatter where they are not.
+/// Differences below these shares are rounding if the samples are the same, and scatter otherwise.
 const SAME: f64 = 0.02;
 const SCATTER: f64 = 0.15;
 
@@ -28,14 +28,14 @@ pub(super) struct Said {
     edges: Option<f64>,
     /// Half of the 95 % interval of the dead time, samples.
     delay_known_to: f64,
-    /// The message of `delay`, where it fails.
+    /// The message of `delay`, if it fails.
     no_edges: Option<String>,
-    /// Verdict and names; none where nobody asked.
+    /// Verdict and names; `None` if `diagnose` was not run.
     finding: Option<String>,
 }
 
 impl Said {
-    /// Asks `identify`, `compare`, `delay` and perhaps `diagnose`; data set and model stay in `scratch`.
+    /// Runs `identify`, `compare`, `delay` and perhaps `diagnose`; data set and model stay in `scratch`.
     pub(super) fn of(records: &[Part], diagnose: bool, scratch: &Path, limit: Duration) -> Self {
         let data = scratch.join("data");
         if let Err(reason) = write(records, &data) {
@@ -46,7 +46,7 @@ impl Said {
         }
         let model = scratch.join("model.toml").to_string_lossy().into_owned();
         let data = data.to_string_lossy().into_owned();
-        // A model of the case before is no answer to this one.
+        // The model of the preceding case must not count as an answer to this one.
         let _ = std::fs::remove_file(&model);
         let run = |name: &str, arguments: &[&str]| {
             let arguments: Vec<String> = arguments.iter().map(|a| (*a).to_owned()).collect();
@@ -100,7 +100,7 @@ impl Said {
     }
 }
 
-/// What `compare` says of the validation records or, without any, of the others.
+/// The results of `compare` for the validation records or, without any, for the others.
 fn judged(compared: &Answer) -> &Value {
     match &compared.document["validate"] {
         Value::Null => &compared.document["identify"],
@@ -108,8 +108,8 @@ fn judged(compared: &Answer) -> &Value {
     }
 }
 
-/// Whether each of two models describes the other's records as well as the other does: then the records do not tell one
-/// structure from the other. Their data sets and models lie in `before` and `after`.
+/// Whether each of two models describes the other's records equally well; the records then do not distinguish the
+/// structures. Their data sets and models are in `before` and `after`.
 pub(super) fn is_near_tie(before: &Path, after: &Path, limit: Duration) -> bool {
     let error = |model: &Path, data: &Path| {
         let [model, data] = [model.join("model.toml"), data.join("data")]
@@ -160,9 +160,9 @@ fn write(records: &[Part], folder: &Path) -> Result<(), String> {
 /// Differences between two answers.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct Differences {
-    /// In structure, delays and poles of the model.
+    /// Differences in structure, delays and poles of the model.
     pub(super) of_model: Vec<String>,
-    /// In all else: verdict, errors, measured delays.
+    /// Differences in everything else: verdict, errors, measured delays.
     pub(super) of_answer: Vec<String>,
 }
 
@@ -173,12 +173,12 @@ impl Differences {
     }
 }
 
-/// What differs between the answers before and after a change that multiplies errors by `factor`.
+/// The differences of the answers before and after a change that multiplies errors by `factor`.
 pub(super) fn broken(change: Change, factor: f64, before: &Said, after: &Said) -> Differences {
     let mut found = Differences::default();
     if before.failed.is_some() || after.failed.is_some() {
         let words = |said: &Said| said.failed.clone().unwrap_or_else(|| "done".to_owned());
-        // A failure of both alike is no difference between them, but no answer either.
+        // A failure of both is not a difference between them, but not an answer either.
         found.of_answer = vec![format!("{} → {}", words(before), words(after))];
         return found;
     }
@@ -206,7 +206,7 @@ pub(super) fn broken(change: Change, factor: f64, before: &Said, after: &Said) -
     if !delays_agree {
         of_model.push(format!("delay {:?} → {:?}", before.delays, after.delays));
     }
-    // FIT is relative to the scatter of y, which rest makes smaller.
+    // FIT is relative to the scatter of y, which additional rest reduces.
     if change != Change::Rest && !near(before.fit_percent, after.fit_percent, points) {
         let (one, two) = (before.fit_percent, after.fit_percent);
         of_answer.push(format!("FIT {one:.2} % → {two:.2} %"));
@@ -229,7 +229,7 @@ pub(super) fn broken(change: Change, factor: f64, before: &Said, after: &Said) -
         of_answer.push(format!("delay: {words}"));
         return found;
     }
-    // Of other samples, estimates agree as closely as they claim to be known.
+    // With other samples, estimates must agree within their stated uncertainty.
     let known_to = match change.changes_samples() {
         true => samples.max(before.delay_known_to.min(after.delay_known_to)),
         false => samples,

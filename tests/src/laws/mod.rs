@@ -1,8 +1,9 @@
-//! Laws on rigs that nobody looked at: which targets `design` refuses or accepts, and what the law does on the true plant.
+//! Laws on unseen rigs: the targets that `design` refuses or accepts, and the law on the true plant.
 //!
-//! The plants are those of `firmware-sim`, physics in continuous time that share no code with the model. A rig is
-//! recorded, identified and diagnosed as a user would; the law is designed for targets drawn over the reachable interval and
-//! tried on what the records leave possible. Then it runs on the rig itself, and the margin is checked there at its ends.
+//! The plants are those of `firmware-sim`, which simulate physics in continuous time and share no code with the
+//! model. A rig is recorded, identified and diagnosed like by a user. The law is designed for targets drawn over
+//! the reachable interval and tried on the plants that the records do not exclude. Then it runs on the rig itself,
+//! and the ends of the margin are checked there.
 
 use anyhow::Context;
 use closed_loop::{Controlled, Figures, OpenLoop, Trace, run, span};
@@ -89,8 +90,8 @@ fn plan_of(seed: u64) -> anyhow::Result<(RigPlan, String)> {
     Ok((plan, hidden.join(", ")))
 }
 
-/// The plant with errors of delay, gain and time constants as factors. Times of the flow's character go with its time constants;
-/// what it remembers of its past is no time constant and stays.
+/// The plant with errors of delay, gain and time constants as factors. The times of the flow's character scale with
+/// its time constants, except the delay of its memory, which is not a time constant.
 fn with_errors(plant: &PlantSpec, [delay, gain, time]: [f64; 3]) -> PlantSpec {
     let character = match plant.character.clone() {
         Character::Inertia { time_s } => Character::Inertia {

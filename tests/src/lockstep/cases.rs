@@ -96,12 +96,12 @@ pub fn all() -> Result<Vec<Case>> {
     Ok(cases)
 }
 
-/// Cases at other loop periods: a relay, the tracking law alone and with an effect at each place, pulses, a user's own
-/// effects, all on a rig whose times are as much longer as the period is, and a model whose effects keep their times in
-/// seconds. The laws are designed anew at each period. Names end in the period in µs.
+/// Cases at other loop periods: a relay, the tracking law alone and with an effect at each place, pulses, user
+/// effects. All run on a rig whose times scale with the period; in one model the effects keep their times in
+/// seconds. The laws are designed for each period. Names end in the period in µs.
 ///
 /// # Errors
-/// A bundled model file that cannot be read, a period that is no loop's, or no law for a model.
+/// A bundled model file that cannot be read, an invalid loop period, or a model without a law.
 pub fn at(periods_s: &[f64]) -> Result<Vec<Case>> {
     // The boards' own model has this name.
     let full = Model::from_toml(bundled!("full"), "full.toml")?;

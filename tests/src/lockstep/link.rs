@@ -18,7 +18,7 @@ pub struct Link {
     from: Channel<u8>,
     receiver: Receiver,
     number: u16,
-    /// Drop one byte in so many, to test error detection; 0 for none.
+    /// Drop one byte in this many, to test error detection; 0 for none.
     lose: usize,
     sent: usize,
     /// Number of dropped bytes.

@@ -48,7 +48,7 @@ fn channel(k: usize) -> u16 {
 /// Runs the case of that number.
 ///
 /// # Errors
-/// A board that has other bits than the host, or does not answer.
+/// A board that computes other bits than the host, or does not answer.
 pub fn run_case(link: &mut Link, number: u8, case: &Case) -> Result<Measured> {
     if link.ask(START, &[number])? != [1] {
         bail!("the board has no case {number}; flash the present firmware");

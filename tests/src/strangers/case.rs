@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-/// A command that is run on a case, beside `import` and `compare`.
+/// A command that is run on a case, in addition to `import` and `compare`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Step {
@@ -69,7 +69,7 @@ pub struct Right {
     pub delay_samples: Option<[f64; 2]>,
     /// Range of every delay that `delay` measures, samples.
     pub edge_delay_samples: Option<[f64; 2]>,
-    /// What the interval of the dead time that `delay` measures must contain, to half a sample.
+    /// Value that the interval of the dead time measured by `delay` must contain, to half a sample.
     pub dead_time_samples: Option<f64>,
     /// Most state lags.
     pub n1_at_most: Option<usize>,

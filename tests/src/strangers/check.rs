@@ -14,7 +14,7 @@ const BELOW_BASELINE: f64 = 1.0;
 const SCORED: f64 = 0.5;
 /// Tolerances of two equal answers: points of FIT, and samples of delay.
 const SAME_FIT: f64 = 0.5;
-/// A sampled command and a sampled answer place an edge to this.
+/// The accuracy of an edge in a sampled command and a sampled response.
 const HALF_A_SAMPLE: f64 = 0.5;
 
 /// All output of the program for a case.
@@ -208,7 +208,7 @@ fn of_identify(right: &Right, heard: &Heard) -> Vec<String> {
     for key in ["records", "identify", "validate"] {
         if found.document[key] != compared[key] {
             wrong.push(format!(
-                "identify: what is printed of `{key}` is not what compare says of the file ({} and {})",
+                "identify: the printed `{key}` differs from that of compare for the file ({} and {})",
                 error_of(&found.document),
                 error_of(compared),
             ));

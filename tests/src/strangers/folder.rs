@@ -18,8 +18,8 @@ pub(super) fn bundled() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("data/strangers")
 }
 
-/// Every case of every set in `folder`: those that an `expected.toml` tells of, there or in the bundled folder of the
-/// same name; pairs of `*_train*.csv` and `*_test*.csv` as measured sets.
+/// Every case of every set in `folder`: the cases of an `expected.toml`, there or in the bundled folder of the same
+/// name; pairs of `*_train*.csv` and `*_test*.csv` are measured sets.
 pub(super) fn cases(folder: &Path) -> Result<Vec<Case>> {
     let mut sets = Vec::new();
     let entries = fs::read_dir(folder).with_context(|| folder.display().to_string())?;

@@ -1,9 +1,9 @@
-//! Records as strangers bring them, and what the program says of them: a table of all sets beside the baselines, with
-//! every answer checked against `expected.toml` or, for measured sets, against the best baseline.
+//! Records from other loggers with the program's answers: a table of all sets with the baselines. Every answer is
+//! checked against `expected.toml` or, for measured sets, against the best baseline.
 //!
-//! The program is run as a user would: `import` where the set says so, `identify` with its defaults, `compare`,
-//! `delay`, `diagnose`, and `discover` and `extend` where asked. The sets lie in `tests/data/strangers`; any other
-//! folder of sets can be named.
+//! The program is run like by a user: `import` if the set requires it, `identify` with its defaults, `compare`,
+//! `delay`, `diagnose`, and `discover` and `extend` on request. The sets are in `tests/data/strangers`; any other
+//! folder of sets can be given.
 
 pub(crate) mod answer;
 mod case;

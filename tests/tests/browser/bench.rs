@@ -1,4 +1,4 @@
-//! The whole way on the bundled set with a hidden effect.
+//! The complete workflow on the bundled set with a hidden effect.
 
 use std::process::Command;
 
@@ -45,7 +45,7 @@ fn the_workbench_finds_what_is_missing_and_loses_nothing() {
     );
     steps.done("identified");
 
-    // Cancelled: the best so far is a model, too. The curve of its progress runs forwards.
+    // After a cancellation the best model so far remains. The curve of the search's progress advances.
     act(&mut b, &page, &identify_for_long());
     until(
         &mut b,
@@ -59,7 +59,7 @@ fn the_workbench_finds_what_is_missing_and_loses_nothing() {
         60,
         "document.querySelector('#curve canvas') !== null",
     );
-    // What it has found so far is seen over the records, and changes.
+    // The best model so far is shown on the records, and changes.
     let drawn = "hostFit.groups[0].charts.filter(c => c.best).length === 8 && document.querySelector('.switches').textContent.includes('best so far')";
     until(&mut b, &page, 60, drawn);
     act(
@@ -101,7 +101,7 @@ fn the_workbench_finds_what_is_missing_and_loses_nothing() {
     );
     until(&mut b, &page, 20, &format!("{CURRENT}.startsWith('1.')"));
 
-    // Killed while it works; another start on the folder has everything.
+    // Killed during a step; a new server on the folder has all results.
     act(&mut b, &page, &identify_for_long());
     until(&mut b, &page, 20, "!document.getElementById('work').hidden");
     drop(served);
@@ -112,7 +112,7 @@ fn the_workbench_finds_what_is_missing_and_loses_nothing() {
         "!document.getElementById('offline').hidden",
     );
     shoot(&mut b, &page, "workbench-offline.png");
-    // The page goes on asking, as it should; the errors of that are no faults.
+    // The page continues to send requests, as intended; their errors are not failures.
     b.close(&page).expect("closed");
     b.faults();
     let served = serve(&project, &[&data]);
@@ -124,7 +124,7 @@ fn the_workbench_finds_what_is_missing_and_loses_nothing() {
         &format!("document.querySelectorAll('.model').length === 2 && {CURRENT}.startsWith('1.')"),
     );
     steps.done("killed, and gone on");
-    // A second browser sees what the first does.
+    // A second browser shows the same state as the first.
     let mut other = Browser::start().expect("chromium");
     let second = other.open(&served.address, size, true).expect("a page");
 
@@ -168,7 +168,7 @@ fn the_workbench_finds_what_is_missing_and_loses_nothing() {
         &page,
         "fetch('/api/state', {headers: {'x-token': new URLSearchParams(location.search).get('token')}}).then(r => r.json()).then(s => { const m = s.models.at(-1); return m.rmse / m.noise_rmse; })",
     );
-    eprintln!("  the held-out error is {times_noise} times the noise");
+    eprintln!("  the validation error is {times_noise} times the noise");
     assert!(times_noise.as_f64() < Some(1.05), "{times_noise}");
     act(
         &mut b,
@@ -181,7 +181,7 @@ fn the_workbench_finds_what_is_missing_and_loses_nothing() {
     shoot(&mut other, &second, "workbench-dark.png");
     assert_eq!(other.faults(), Vec::<String>::new());
 
-    // Undo is the parent; what was made stays in the tree, and any two are compared.
+    // Undo returns to the parent; later models stay in the tree, and any two models can be compared.
     act(
         &mut b,
         &page,
@@ -227,7 +227,7 @@ fn the_workbench_finds_what_is_missing_and_loses_nothing() {
         20,
         "[...document.querySelectorAll('.switches label')].some(l => l.textContent.startsWith('3. '))",
     );
-    // Another branch, from the model that was gone back to.
+    // Another branch, from the earlier model.
     act(
         &mut b,
         &page,
@@ -268,7 +268,7 @@ fn the_workbench_finds_what_is_missing_and_loses_nothing() {
     ));
     steps.done("downloaded, compiled");
 
-    // The diagnosis as a page: the ladder's steps lie on the curves once they are switched on.
+    // The diagnosis as a page: the ladder's steps appear as curves once they are switched on.
     let diagnosis = format!("file://{}", project.join("diagnosis-1.html").display());
     let report = b.open(&diagnosis, size, false).expect("a page");
     let drawn = "hostFit.groups[0].charts.filter(c => c.plots[0]?.series.some(s => s.label === 'refitted with the fewest lags')).length";
@@ -316,12 +316,12 @@ fn the_workbench_finds_what_is_missing_and_loses_nothing() {
     shoot(&mut b, &phone, "workbench-phone-missing.png");
     assert_eq!(b.faults(), Vec::<String>::new());
 
-    // The command line goes on with the same folder.
+    // The command line continues in the same folder.
     drop(served);
     run(&[&"compare", &project.join("model-3.toml"), &data]);
 }
 
-/// A crate of these constants, without the standard library, on `model-core` alone.
+/// A crate with these constants, without the standard library, that depends on `model-core` alone.
 fn compiles(constants: &str, folder: &std::path::Path) {
     std::fs::create_dir_all(folder.join("src")).expect("a folder");
     std::fs::write(folder.join("src/identified.rs"), constants).expect("a file");

@@ -1,4 +1,4 @@
-//! Files of the user's, effects of the user's, laws.
+//! The user's own files and effects, and laws.
 
 use std::path::Path;
 
@@ -20,7 +20,7 @@ fn drop_file(b: &mut Browser, page: &Page, name: &str, text: &str) {
     );
 }
 
-/// A record as an office program in Germany would write it: semicolons, decimal commas, a voltage for the valve, units.
+/// A record as written by an office program in Germany: semicolons, decimal commas, a voltage for the valve, units.
 fn german(file: &str) -> String {
     let text =
         std::fs::read_to_string(root().join("data/hidden-ramp").join(file)).expect("a record");
@@ -59,7 +59,7 @@ fn recordings_are_dropped_mapped_and_identified() {
     accessible(&mut b, &page);
     shoot(&mut b, &page, "workbench-empty.png");
 
-    // What cannot be read is said, and kept nowhere.
+    // An unreadable file is reported and not stored.
     drop_file(&mut b, &page, "notes.csv", "nothing that is a table\n");
     until(
         &mut b,
@@ -83,7 +83,7 @@ fn recordings_are_dropped_mapped_and_identified() {
             &format!("document.getElementById('uploads').textContent.includes('{name}')"),
         );
     }
-    // A command in volts is no on/off command: that is said, with the remedy.
+    // A command in volts is not an on/off command; the message says so and gives the remedy.
     let choose = "(() => { const f = document.getElementById('mapping').elements; f.t.value = 'Zeit'; f.u.value = 'Ventil'; f.y.value = 'Reibung'; document.querySelector('[name=validate][value=c]').checked = true; f.t.form.requestSubmit(); })()";
     act(&mut b, &page, choose);
     until(
@@ -111,8 +111,7 @@ fn recordings_are_dropped_mapped_and_identified() {
     steps.done("identified");
     assert_eq!(b.faults(), Vec::<String>::new());
 
-    // The project brings its data along.
-    // The page goes first: one that loses its server complains.
+    // The project contains its data. The page is closed first, because it reports the loss of its server.
     b.close(&page).expect("closed");
     drop(served);
     let served = serve(&project, &[]);
@@ -189,7 +188,7 @@ fn an_own_effect_is_mended_under_the_cursor_and_a_law_designed() {
             "(() => {{ const a = document.getElementById('own-text'); a.value = {text}; a.dispatchEvent(new Event('input')); a.scrollIntoView(); }})()"
         )
     };
-    // The mistake is shown while it is written, with a mark below it; Keep puts the cursor there.
+    // The error is shown during typing, with a mark below it; Keep puts the cursor there.
     act(&mut b, &page, &write(DROOP));
     until(
         &mut b,
@@ -230,7 +229,7 @@ fn an_own_effect_is_mended_under_the_cursor_and_a_law_designed() {
     );
     steps.done("added");
 
-    // A law: a goal that is out of reach is refused in words, one within is tried in the loop.
+    // A law: an unreachable goal is refused with a message, a reachable one is tried in the loop.
     let design = |target: f64| {
         format!(
             "(() => {{ const f = document.getElementById('design'); f.elements.target.value = {target}; f.requestSubmit(); }})()"

@@ -1,5 +1,5 @@
-//! Report and workbench in a real browser. They need chromium and the packages of `host-fit/web`, so they run where those are:
-//! `cargo xtask browser`, which leaves pictures in `target/browser`.
+//! Report and workbench in a real browser. The tests need chromium and the packages of `host-fit/web`, so they run
+//! only with `cargo xtask browser`, which leaves pictures in `target/browser`.
 
 mod bench;
 mod files;
@@ -44,7 +44,7 @@ fn act(b: &mut Browser, page: &Page, expression: &str) -> Value {
     b.eval(page, expression).expect("an expression of the test")
 }
 
-/// Waits until an expression is true; so many seconds are plenty on a machine that has nothing else to do.
+/// Waits until an expression is true; the time limit is generous for an idle machine.
 #[track_caller]
 fn until(b: &mut Browser, page: &Page, seconds: u64, expression: &str) {
     const BUSY: u64 = 3;
@@ -58,7 +58,7 @@ fn until(b: &mut Browser, page: &Page, seconds: u64, expression: &str) {
     }
 }
 
-/// Where a picture lies that is to be looked at.
+/// Path of a picture to be inspected.
 fn picture(name: &str) -> PathBuf {
     let folder = program()
         .parent()
@@ -67,7 +67,7 @@ fn picture(name: &str) -> PathBuf {
     folder.join(name)
 }
 
-/// WCAG 2.1 A and AA, as far as a machine can tell.
+/// WCAG 2.1 A and AA, as far as a program can check them.
 #[track_caller]
 fn accessible(b: &mut Browser, page: &Page) {
     let path = root().join("host-fit/web/node_modules/axe-core/axe.min.js");
@@ -88,7 +88,7 @@ fn fits(b: &mut Browser, page: &Page, width: f64) {
     assert!(wide.as_f64() <= Some(width), "{wide} px wide on {width} px");
 }
 
-/// The workbench, serving; ends with this value, as abruptly as a power cut.
+/// A running workbench; dropping this value kills it without a shutdown.
 struct Served {
     child: Child,
     address: String,
@@ -127,15 +127,15 @@ fn serve(project: &Path, rest: &[&dyn AsRef<std::ffi::OsStr>]) -> Served {
     }
 }
 
-/// Nothing runs, and there are so many models.
+/// No task runs, and there are this many models.
 fn idle_with(models: usize) -> String {
     format!(
         "document.getElementById('work').hidden && document.querySelectorAll('.model').length === {models}"
     )
 }
 
-/// Pans the records of a page, all that is in sight redrawn in each frame: milliseconds of the page's own thread in a frame, and
-/// what a frame takes by the clock of this machine as busy as it is.
+/// Pans the records of a page, with everything in sight redrawn in each frame. Returns the milliseconds of the
+/// page's own thread per frame, and the duration of a frame by this machine's clock under its present load.
 fn panned(b: &mut Browser, page: &Page) -> f64 {
     const FRAMES: u32 = 120;
     let before = b.worked(page).expect("its time");
@@ -155,7 +155,7 @@ fn panned(b: &mut Browser, page: &Page) -> f64 {
     own
 }
 
-/// The time of a page's thread in a frame that no machine, however busy, may pass, ms: 30 frames a second are 33.
+/// Largest time of a page's thread per frame on any machine, ms: at 30 frames a second a frame lasts 33.
 const SLOWEST_FRAME: f64 = 80.0;
 
 /// A short identification.
@@ -163,7 +163,7 @@ fn identify(evaluations: u32) -> String {
     identify_lags(2, 150, evaluations)
 }
 
-/// An identification that takes longer than anybody waits.
+/// An identification that takes longer than the test.
 fn identify_for_long() -> String {
     identify_lags(10, 500, 1_000_000)
 }
@@ -174,7 +174,7 @@ fn identify_lags(lags: u32, longest: u32, evaluations: u32) -> String {
     )
 }
 
-/// Says how long a step took: the list of the issue.
+/// Prints the duration of a step.
 struct Steps(Instant);
 
 impl Steps {

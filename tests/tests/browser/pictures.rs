@@ -1,6 +1,7 @@
-//! Pictures of pages, compared with those that were looked at: thumbnails of 64 × 64 greys, because fonts differ from machine to machine.
+//! Screenshots of pages, compared with inspected ones as thumbnails of 64 × 64 greys, because fonts differ between
+//! machines.
 //!
-//! `cargo xtask browser --bless` writes the thumbnails anew; look at the pictures in `target/browser` first.
+//! `cargo xtask browser --bless` rewrites the thumbnails; inspect the pictures in `target/browser` first.
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
@@ -9,21 +10,22 @@ use serde_json::Value;
 
 use super::{act, picture, root};
 
-/// Largest mean difference of the greys, of 255: another font makes 1 to 3, a page in the wrong colours some 200, a missing section 15.
+/// Largest mean difference of the greys, of 255: another font makes 1 to 3, a page in wrong colours about 200, a
+/// missing section 15.
 const DIFFERENCE: f64 = 8.0;
 
-/// A browser's own means reduce a picture: no decoder of PNG is needed here. `small` gives 64 × 64 greys row by row.
+/// The browser reduces a picture, so no PNG decoder is needed here. `small` returns 64 × 64 greys row by row.
 const SMALL: &str = "async (address) => { const i = new Image(); i.src = address; await i.decode(); const c = new OffscreenCanvas(i.width, i.height), x = c.getContext('2d'); x.drawImage(i, 0, 0); const d = x.getImageData(0, 0, i.width, i.height).data, n = 64, sum = new Array(n * n).fill(0), count = new Array(n * n).fill(0); for (let r = 0; r < i.height; r++) for (let k = 0; k < i.width; k++) { const cell = Math.floor(r * n / i.height) * n + Math.floor(k * n / i.width), p = 4 * (r * i.width + k); sum[cell] += 0.299 * d[p] + 0.587 * d[p + 1] + 0.114 * d[p + 2]; count[cell] += 1; } return sum.map((s, k) => Math.round(s / count[k])); }";
 
 /// A PNG of 64 × 64 greys, base64.
 const PNG: &str = "async (greys) => { const c = new OffscreenCanvas(64, 64), x = c.getContext('2d'), d = x.createImageData(64, 64); greys.forEach((g, k) => d.data.set([g, g, g, 255], 4 * k)); x.putImageData(d, 0, 0); const b = new Uint8Array(await (await c.convertToBlob()).arrayBuffer()); return btoa(String.fromCharCode(...b)); }";
 
-/// Takes a picture, an artefact of CI, and compares it with the one that was looked at.
+/// Takes a picture, an artefact of CI, and compares it with the inspected one.
 #[track_caller]
 pub(crate) fn shoot(b: &mut Browser, page: &Page, name: &str) {
     let path = picture(name);
     b.screenshot(page, &path).expect("a picture");
-    // A page of its own: what is looked at forbids pictures from elsewhere, and is not to be disturbed.
+    // A separate page, because the tested page forbids foreign pictures and must not be changed.
     let desk = b.open("about:blank", (64, 64), false).expect("a page");
     let taken = greys(b, &desk, &std::fs::read(&path).expect("the picture"));
     let known = root().join("tests/tests/browser/pictures").join(name);

@@ -1,4 +1,4 @@
-//! What a page prints: curves are lines of the PDF, not empty canvases.
+//! The printed page: curves are lines of the PDF, not empty canvases.
 
 use std::io::Read as _;
 
@@ -24,7 +24,7 @@ fn segments(pdf: &[u8]) -> usize {
         let packed = packed.strip_prefix(b"\r").unwrap_or(packed);
         let packed = packed.strip_prefix(b"\n").unwrap_or(packed);
         let mut text = Vec::new();
-        // Fonts and pictures unpack as well, or do not; they hold no such lines.
+        // Fonts and pictures may decompress as well; they contain no such lines.
         let _ = ZlibDecoder::new(packed).read_to_end(&mut text);
         let lines = text.split(|b| *b == b'\n');
         count += lines.filter(|line| line.ends_with(b" l")).count();
@@ -43,7 +43,7 @@ fn a_printed_report_keeps_its_curves() {
     run(&[&"compare", &model, &data, &"--report", &page_file]);
     let address = format!("file://{}", page_file.display());
     let mut b = Browser::start().expect("chromium");
-    // From a dark screen: paper is white all the same.
+    // Printed from a dark screen: the paper is white nevertheless.
     let page = b.open(&address, (1100, 1000), true).expect("a page");
     until(&mut b, &page, 20, "hostFit.groups[0].charts.length === 8");
     let pdf = b.pdf(&page).expect("a PDF");
@@ -59,7 +59,7 @@ fn a_printed_report_keeps_its_curves() {
     );
     let without = segments(&b.pdf(&page).expect("a PDF"));
     eprintln!("  printed: {with} line segments, {without} without the records");
-    // Eight records, measurement and model and residual, some hundred segments each.
+    // Eight records with measurement, model and residual, some hundred segments each.
     assert!(with > without + 8 * 3 * 200, "{with} and {without}");
     // The screen is as it was.
     until(

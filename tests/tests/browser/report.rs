@@ -19,7 +19,7 @@ fn a_report_is_looked_along() {
     accessible(&mut b, &page);
     shoot(&mut b, &page, "report-light.png");
 
-    // A bar lights up its samples, and the address keeps it.
+    // A bar marks its samples, and the address stores it.
     let to_record = "document.querySelectorAll('.record')[6].scrollIntoView()";
     act(
         &mut b,
@@ -43,11 +43,11 @@ fn a_report_is_looked_along() {
         10,
         "document.querySelectorAll('.record')[6].querySelectorAll('canvas').length === 2",
     );
-    // Lit samples are painted at the top of the chart, in a colour that nothing else has there.
+    // Marked samples are painted at the top of the chart, in a colour that nothing else there has.
     let painted = "(() => { const c = document.querySelectorAll('.record')[6].querySelector('canvas'); const d = c.getContext('2d').getImageData(0, 12, c.width, 1).data; let n = 0; for (let i = 0; i < d.length; i += 4) if (d[i] > 150 && d[i + 1] < 110 && d[i + 2] < 40 && d[i + 3] > 200) n++; return n; })()";
     until(&mut b, &page, 10, &format!("{painted} > 3"));
 
-    // Pointing reads values, in every record, and marks the bars of the sample.
+    // Pointing shows values in every record and marks the bars of the sample.
     let middle = act(
         &mut b,
         &page,
@@ -92,7 +92,7 @@ fn a_report_is_looked_along() {
     b.key(&page, "Home").expect("a key");
     until(&mut b, &page, 5, "hostFit.groups[0].view.to > 9.9");
 
-    // A figure as a file is what is drawn.
+    // A saved figure equals the displayed one.
     act(
         &mut b,
         &page,

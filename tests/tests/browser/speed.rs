@@ -1,4 +1,4 @@
-//! How fast pages are: the page's own times, on records as long as they get.
+//! Speed of pages: the page's own times, on the longest records.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -8,7 +8,7 @@ use scenarios::browser::Browser;
 
 use super::{SLOWEST_FRAME, act, panned, root, run, serve, until};
 
-/// A record of a flow that lags behind the valve, with noise that repeats.
+/// A record of a flow that lags behind the valve, with repeatable noise.
 fn record(samples: usize, period: f64) -> String {
     let mut csv = "t,u,y\n".to_owned();
     let (mut y, mut noise) = (0.0, 1_u32);
@@ -125,7 +125,7 @@ fn long_records_open_and_pan_smoothly() {
     let size = std::fs::metadata(&page_file).expect("the report").len();
     eprintln!("  a report of 8 records weighs {:.2} MB", size as f64 / 1e6);
     assert!(size < 5_000_000);
-    // Within 2 s where nothing else runs.
+    // Within 2 s on an idle machine.
     assert!(opened < 10.0, "600 000 samples took {opened} s");
     assert_eq!(b.faults(), Vec::<String>::new());
 }

@@ -1,4 +1,5 @@
-//! What no catalogue has, and what the records cannot tell apart: found on the page, to the end.
+//! A term outside the catalogue, and one that the records do not distinguish from another: found on the page, up to
+//! the end.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -27,11 +28,11 @@ impl Chance {
     }
 }
 
-/// A record: its name, its use, and how long the next switch lasts, samples.
+/// A record: its name, its use, and the duration until the next switch, samples.
 type Asked = (&'static str, &'static str, fn(&mut Chance) -> usize);
 
-/// A flow of first order behind a valve, whose jet is what `jet` makes of the command that arrives and of the number of its
-/// pulse; read with a noise of 0.01.
+/// A first-order flow behind a valve. Its jet is the function `jet` of the arriving command and of the number of
+/// its pulse; it is read with a noise of 0.01.
 fn set(folder: &Path, samples: usize, records: &[Asked], jet: fn(&mut f64, f64, u32) -> f64) {
     const ARRIVES: usize = 20;
     const NOISE: f64 = 0.01;
@@ -84,7 +85,8 @@ fn a_term_that_no_catalogue_has_is_found_and_taken_as_a_formula() {
         ("slow", "validate", |_| 400),
         ("c", "validate", telegraph),
     ];
-    // Jets that lose half of their strength over some six pulses: a sensor that tires would show the same.
+    // Jets that lose half of their strength over about six pulses: a sensor with decreasing sensitivity would give
+    // the same readings.
     set(&data, 3000, records, |_, u, pulse| {
         u * (1.0 - 0.5 * (1.0 - (-(f64::from(pulse) - 1.0) / 6.0).exp()))
     });
@@ -111,7 +113,7 @@ fn a_term_that_no_catalogue_has_is_found_and_taken_as_a_formula() {
         "document.querySelector('.model.current').textContent.includes('-by-pulse-number')",
     );
     steps.done("discovered");
-    // What was found is told where it was looked for.
+    // The finding is shown where the search was started.
     act(
         &mut b,
         &page,
@@ -158,7 +160,7 @@ fn a_term_that_no_catalogue_has_is_found_and_taken_as_a_formula() {
         &page,
         "fetch('/api/state', {headers: {'x-token': new URLSearchParams(location.search).get('token')}}).then(r => r.json()).then(s => { const m = s.models.at(-1); return m.rmse / m.noise_rmse; })",
     );
-    eprintln!("  the held-out error is {times_noise} times the noise");
+    eprintln!("  the validation error is {times_noise} times the noise");
     assert!(times_noise.as_f64() < Some(1.15), "{times_noise}");
     steps.done("as a formula in the model");
     assert_eq!(b.faults(), Vec::<String>::new());
@@ -169,7 +171,7 @@ fn a_term_that_no_catalogue_has_is_found_and_taken_as_a_formula() {
 fn the_experiment_that_tells_is_drawn_and_saved() {
     let folder = tempfile::tempdir().expect("a folder");
     let data = folder.path().join("saturation");
-    // A pull that grows with the cube of y, or with how long it lasted: slow squares show the same of both.
+    // A pull that grows with the cube of y, or with its duration: slow square waves do not distinguish the two.
     let records: &[Asked] = &[
         ("a", "identify", |_| 250),
         ("b", "identify", |_| 150),

@@ -6,7 +6,7 @@ use proptest::prelude::*;
 use std::sync::atomic::Ordering;
 use tower::ServiceExt as _;
 
-/// A bench that does nothing well, and panics where it is told to.
+/// A bench whose actions do nothing, or panic on request.
 struct Dummy;
 
 impl Bench for Dummy {
@@ -115,7 +115,7 @@ fn the_token_is_needed_and_differs_from_run_to_run() {
         let by_address = empty(request(Method::GET, &format!("{path}?token={token}"), None));
         assert_ne!(status(&app, by_address), StatusCode::FORBIDDEN);
     }
-    // What changes something needs it as a header, which no form of another page can send.
+    // Requests that change something need it as a header, which no form of another page can send.
     let post = empty(request(
         Method::POST,
         &format!("/api/cancel?token={token}"),
@@ -180,7 +180,7 @@ fn large_requests_are_refused() {
     for path in ["/api/run", "/api/select", "/api/ask"] {
         assert_eq!(sent(path, LARGEST + 1), StatusCode::PAYLOAD_TOO_LARGE);
     }
-    // Recordings are larger than questions, and have their limit as well.
+    // Recordings are larger than other requests and have a separate limit.
     assert_eq!(sent("/api/upload/a.csv", LARGEST + 1), StatusCode::OK);
     assert_eq!(
         sent("/api/upload/a.csv", LARGEST_FILE + 1),
@@ -230,7 +230,7 @@ fn one_piece_of_work_at_a_time_cancelled_and_survived() {
         );
         assert_eq!(send("/api/cancel", "").await, StatusCode::OK);
         idle().await;
-        // A panic in the library ends the work and not the server.
+        // A panic in the library ends the task and not the server.
         assert_eq!(
             send("/api/run", r#"{"action":"panic"}"#).await,
             StatusCode::ACCEPTED
@@ -282,7 +282,8 @@ fn piece() -> impl Strategy<Value = String> {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 600, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// Whatever is asked, the server answers, with nothing of its own failing, and with nothing at all to whoever has no token.
+    /// The server answers every request, without a failure of its own, and sends nothing to a client without a
+    /// token.
     #[test]
     fn arbitrary_requests_are_answered(
         method in prop::sample::select(vec!["GET", "POST", "PUT", "DELETE", "HEAD", "OPTIONS", "TRACE", "X"]),
@@ -301,7 +302,7 @@ proptest! {
             Ok(value) if name != "host" => builder.header(&name, value),
             _ => builder,
         };
-        // What is no address at all never reaches the server.
+        // A text that is not an address never reaches the server.
         let Ok(request) = builder.body(Body::from(body.clone())) else { return Ok(()) };
         // These two are the dummy's panics.
         prop_assume!(!String::from_utf8_lossy(&body).contains("\"model\":2"));

@@ -1,4 +1,5 @@
-//! Steps of CI, three at a time. Each is a process of its own; its output is kept together and printed when it has ended.
+//! Steps of CI, three at a time. Each is a separate process, whose output is collected and printed when it has
+//! ended.
 
 use super::{BUILD, Step};
 use crate::shell::target;
@@ -9,9 +10,9 @@ use std::process::{Command, Stdio};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
-/// Steps at a time: CI has two cores, and a step in three waits for a browser, an emulator or a disk.
+/// Steps at a time: CI has two cores, and one of three steps usually waits for a browser, an emulator or a disk.
 const LANES: usize = 3;
-/// How the last lines of a step's output begin ([`alone`]).
+/// Beginning of the last lines of a step's output ([`alone`]).
 const FAILED: &str = "step failed: ";
 const CPU: &str = "step used CPU seconds: ";
 
@@ -21,9 +22,9 @@ pub(super) struct Done {
     pub(super) name: &'static str,
     /// By the clock, s.
     pub(super) wall: f64,
-    /// Of all its processes, s; unknown where the system does not say.
+    /// Processor time of all its processes, s; unknown if the system does not provide it.
     pub(super) cpu: Option<f64>,
-    /// The reason, of a step that failed.
+    /// The reason, for a step that failed.
     pub(super) failure: Option<String>,
     /// Everything it printed.
     pub(super) output: String,
@@ -35,13 +36,13 @@ struct Progress {
     done: Vec<Done>,
 }
 
-/// Runs the steps: always the first that waits for nothing. Gives them in the order in which they ended.
+/// Runs the steps: always the first one that need not wait. Returns them in the order in which they ended.
 pub(super) fn run(steps: &[&'static Step]) -> Result<Vec<Done>> {
     let folder = target().join("ci");
     std::fs::create_dir_all(&folder)?;
-    // A step may build this program anew in its place.
+    // A step may rebuild this program.
     let program = folder.join("xtask");
-    // The copy of a run that was stopped may still be at work.
+    // A copy of a stopped run may still be running.
     let _ = std::fs::remove_file(&program);
     std::fs::copy(std::env::current_exe()?, &program).context("could not copy this program")?;
     let (progress, changed) = (Mutex::new(Progress::default()), Condvar::new());
@@ -78,7 +79,7 @@ fn lock(progress: &Mutex<Progress>) -> MutexGuard<'_, Progress> {
     progress.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// The next step to start, as soon as there is one, and which of its needs failed.
+/// The next step that can start, or a step that cannot, with the failed one that it needs.
 fn next(
     steps: &[&'static Step],
     progress: &Mutex<Progress>,
@@ -100,7 +101,8 @@ fn next(
 }
 
 impl Progress {
-    /// Whether it is not started, its room is free, and all that it comes after has ended or was not asked for.
+    /// Whether it has not started, its room is free, and all steps that it must follow have ended or were not
+    /// requested.
     fn is_ready(&self, step: &Step, chosen: &[&Step]) -> bool {
         let has_ended = |name: &str| self.done.iter().any(|done| done.name == name);
         let has_started = |name: &str| self.started.contains(&name);
@@ -115,7 +117,7 @@ impl Progress {
     }
 }
 
-/// Runs a step in a process of its own.
+/// Runs a step in a separate process.
 fn process(step: &Step, program: &Path, folder: &Path) -> Result<Done> {
     let path = folder.join(step.name.replace(' ', "-") + ".log");
     let log = File::create(&path).with_context(|| path.display().to_string())?;
@@ -142,7 +144,7 @@ fn process(step: &Step, program: &Path, folder: &Path) -> Result<Done> {
     })
 }
 
-/// Runs a step in this process: `ci` with one name. Says last what [`process`] reads.
+/// Runs a step in this process: `ci` with one name. Its last output line is read by [`process`].
 pub(super) fn alone(step: &Step) -> Result<()> {
     let result = (step.run)();
     if let Err(error) = &result {
@@ -154,10 +156,11 @@ pub(super) fn alone(step: &Step) -> Result<()> {
     result
 }
 
-/// What this process and those that it waited for have used, s. Linux says it in ticks of 10 ms.
+/// Processor time of this process and of those that it waited for, s. Linux provides it in ticks of 10 ms.
 fn cpu_seconds() -> Option<f64> {
     let stat = std::fs::read_to_string("/proc/self/stat").ok()?;
-    // Behind the name, which may have blanks: state is the first field, the four times follow as the 12th to 15th.
+    // After the name, which may contain blanks: the state is the first field, and the four times are the 12th to
+    // 15th.
     let (_, fields) = stat.rsplit_once(')')?;
     let times = fields.split_whitespace().skip(11).take(4);
     let ticks: u64 = times

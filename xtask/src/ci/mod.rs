@@ -10,16 +10,16 @@ use anyhow::{Context, Result, bail};
 
 pub(crate) const TASK: Task = Task {
     name: "ci",
-    does: "everything CI runs; goes on after a failure and lists all at the end",
+    does: "runs everything of CI; continues after a failure and lists all failures at the end",
     run: ci,
 };
 
-/// A part of CI, which runs beside another.
+/// A part of CI, which runs concurrently with others.
 struct Step {
     name: &'static str,
-    /// Steps that have to end before it starts; where one of them fails it is not run.
+    /// Steps that must end before it starts; if one of them fails it is not run.
     after: &'static [&'static str],
-    /// What no two steps use at a time.
+    /// A resource that no two steps use at the same time.
     room: Option<Room>,
     run: fn() -> Result<()>,
 }
@@ -28,7 +28,7 @@ struct Step {
 enum Room {
     /// The workspace's folder of artefacts, which cargo locks while it compiles and before it runs tests.
     Host,
-    /// The firmware's, where programs for boards and their constants lie under one name each.
+    /// The firmware's folder, in which programs for boards and their constants have fixed names.
     Firmware,
 }
 
@@ -36,7 +36,7 @@ enum Room {
 const BUILD: &str = "build";
 const SET_UP: &str = "set-up";
 
-/// In the order in which they start where nothing stands in the way.
+/// In the order in which they start if none has to wait.
 const STEPS: &[Step] = &[
     Step {
         name: BUILD,
@@ -66,15 +66,15 @@ const STEPS: &[Step] = &[
         room: None,
         run: || crate::setup::setup(&[]),
     },
-    // The README's test command; documentation examples are part of it. All of it is compiled before, so that the
-    // folder is locked for moments only.
+    // The README's test command, including documentation examples. Everything is compiled before, so that the
+    // folder is locked only briefly.
     Step {
         name: "tests",
         after: &[BUILD],
         room: None,
         run: || run(&mut cargo(&["test", "--release", "--workspace"])),
     },
-    // What a report carries is what the sources give.
+    // The bundle in reports equals the sources.
     Step {
         name: "pages",
         after: &[SET_UP],
@@ -130,14 +130,14 @@ const STEPS: &[Step] = &[
         room: Some(Room::Host),
         run: || (crate::package::TASK.run)(&[]),
     },
-    // What is handed to people without a compiler: archive and wheel, installed elsewhere.
+    // Archive and wheel for people without a compiler, installed in another folder.
     Step {
         name: "release",
         after: &[SET_UP, BUILD],
         room: None,
         run: || crate::release::release(&[]),
     },
-    // An effect and a delay law are one file and one line each.
+    // An effect and a delay law need one file and one line each.
     Step {
         name: "new effect",
         after: &[BUILD],
@@ -151,7 +151,7 @@ const STEPS: &[Step] = &[
         room: None,
         run: crate::fuzz::brief,
     },
-    // The book's pages are what the catalogue gives, and every link of them leads somewhere.
+    // The generated pages equal the catalogue, and every link has a target.
     Step {
         name: "book",
         after: &[BUILD],
@@ -170,7 +170,8 @@ const STEPS: &[Step] = &[
                 "--package=firmware",
                 "--package=identified",
                 "--package=log-reader",
-                // As in tests; otherwise every dependency is checked once for them and once for the rest.
+                // With the test profile; otherwise every dependency would be checked once for tests and once for
+                // the rest.
                 "--config=profile.release.panic=\"unwind\"",
                 "--",
                 "-Dwarnings",
@@ -218,7 +219,7 @@ const STEPS: &[Step] = &[
         room: Some(Room::Firmware),
         run: crate::nucleo::nucleo,
     },
-    // The exported models say what the host says.
+    // The exported models agree with the host.
     Step {
         name: "agreement",
         after: &[SET_UP, BUILD],
@@ -264,7 +265,7 @@ const STEPS: &[Step] = &[
         room: Some(Room::Firmware),
         run: || crate::rig_day::rig_day(&["--brief".to_owned()]),
     },
-    // The whole way: what the demo found is built for the board and runs there.
+    // The whole workflow: the model found by the demo is built for the board and runs there.
     Step {
         name: "demo on board",
         after: &[SET_UP, BUILD],

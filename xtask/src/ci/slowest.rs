@@ -1,10 +1,10 @@
-//! The longest test programs in what `cargo test` printed.
+//! The longest test programs in the output of `cargo test`.
 
 /// Programs that are listed.
 const LISTED: usize = 10;
 
-/// A table of the test programs that took longest, and the tests that said they had nothing to test; empty where
-/// no test program ran.
+/// A table of the test programs that took longest, and of the tests that reported missing data; empty if no test
+/// program ran.
 pub(super) fn lines(output: &str) -> Vec<String> {
     let mut programs = Vec::new();
     let mut running = None;
@@ -27,7 +27,7 @@ pub(super) fn lines(output: &str) -> Vec<String> {
     let rows = programs.iter().take(LISTED);
     let rows = rows.map(|(seconds, name)| format!("  {seconds:7.1} s  {name}"));
     let title = (!programs.is_empty()).then(|| "\nlongest test programs".to_owned());
-    // One test at a time, and its name is on the same line.
+    // One test at a time, with its name on the same line.
     let skipped = output
         .lines()
         .filter_map(|line| Some(&line[line.find("skipped: ")?..]));
@@ -38,7 +38,7 @@ pub(super) fn lines(output: &str) -> Vec<String> {
         .collect()
 }
 
-/// The program's name without its hash, behind it what it was built from.
+/// The program's name without its hash, followed by its source.
 fn program(named: &str) -> String {
     let Some((source, path)) = named.split_once(" (") else {
         return format!("documentation of {named}");

@@ -13,7 +13,7 @@ use std::path::Path;
 
 pub(crate) const TASK: Task = Task {
     name: "new-effect",
-    does: "NAME --place jet|delay|flow|sensor: makes the files of a new effect, model's and plant's",
+    does: "NAME --place jet|delay|flow|sensor: makes the files of a new effect for model and plant",
     run: new_effect,
 };
 
@@ -73,7 +73,7 @@ const PLACES: [Holes; 3] = [
             ("Place", "Flow"),
             ("flow", "Flow, "),
             ("bench", "flow"),
-            ("equation", "adds −g·s to the drive"),
+            ("equation", "−g·s is added to the drive"),
             (
                 "hook",
                 "    #[inline]
@@ -146,13 +146,13 @@ const PLACES: [Holes; 3] = [
 fn new_effect(arguments: &[String]) -> Result<()> {
     let words: Vec<&str> = arguments.iter().map(String::as_str).collect();
     let (&[name, "--place", place] | &["--place", place, name]) = words.as_slice() else {
-        bail!("say `cargo xtask new-effect NAME --place jet|delay|flow|sensor`");
+        bail!("usage: `cargo xtask new-effect NAME --place jet|delay|flow|sensor`");
     };
     let written = write(&root(), name, place)?;
     for file in &written {
         println!("{file}");
     }
-    println!("Both do nothing to a model yet; docs/adding-an-effect.md says what goes where.");
+    println!("Both have no influence yet; docs/adding-an-effect.md says what to add.");
     Ok(())
 }
 
@@ -174,7 +174,7 @@ pub(crate) fn write(root: &Path, name: &str, place: &str) -> Result<[String; 2]>
     let holes = match holes {
         Some(holes) => [&holes.model[..], &holes.plant[..]].concat(),
         None if delay => Vec::new(),
-        None => bail!("`{place}` is no place: an effect acts on jet, delay, flow or sensor"),
+        None => bail!("`{place}` is not a place: an effect acts on jet, delay, flow or sensor"),
     };
     let file = name.replace('-', "_");
     let fill = |template: &str| {

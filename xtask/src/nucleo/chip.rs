@@ -1,6 +1,6 @@
-//! What QEMU's STM32F405 lacks of the Nucleo's F446, register by register: clock
-//! tree, pins, flash's wait states, watchdog, and a converter that a timer starts.
-//! They behave as the reference manual (RM0390) says for what the program does.
+//! The parts of the Nucleo's F446 that QEMU's STM32F405 lacks, register by register: clock tree, pins, flash's wait
+//! states, watchdog, and a converter that a timer starts. They behave as the reference manual (RM0390) states, as
+//! far as the program uses them.
 
 use std::collections::BTreeMap;
 
@@ -31,7 +31,7 @@ pub(super) const BLOCKS: [(&str, u32, u32, Option<Clock>); 9] = [
     ("RCC", RCC, 0x98, None),
     ("FLASH", FLASH, 0x1C, None),
 ];
-/// The converters' common control register stands apart.
+/// The converters' common control register has a separate address.
 pub(super) const ADC_CCR: u32 = ADC1 + 0x304;
 /// Registers of RCC that are also written bit by bit, through their alias.
 const BIT_BANDED: [u32; 6] = [0x10, 0x20, 0x24, 0x30, 0x40, 0x44];

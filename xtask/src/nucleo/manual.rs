@@ -71,9 +71,9 @@ fn clock_tree(chip: &Chip) -> Result<String> {
     let (pll, buses) = (chip.value(RCC_PLLCFGR), chip.value(RCC_CFGR));
     ensure!(
         field(chip.value(RCC_CR), 16, 4) & 0b101 == 0b101,
-        "the crystal's input is not on, or not bypassed"
+        "the crystal's input is not on, or not in bypass"
     );
-    ensure!(pll >> 22 & 1 == 1, "the PLL does not take the crystal");
+    ensure!(pll >> 22 & 1 == 1, "the PLL does not use the crystal");
     let input = CRYSTAL / f64::from(field(pll, 0, 6));
     let inside = input * f64::from(field(pll, 6, 9));
     ensure!(
@@ -106,7 +106,7 @@ fn clock_tree(chip: &Chip) -> Result<String> {
     ))
 }
 
-/// Where a write of which `wanted` is true stands among all.
+/// Position of the first write for which `wanted` is true, among all writes.
 fn first(chip: &Chip, what: &str, wanted: impl Fn(&Written) -> bool) -> Result<usize> {
     chip.written
         .iter()
@@ -129,7 +129,7 @@ fn clock_order(chip: &Chip) -> Result<String> {
         divisors < pll,
         "the PLL's divisors were written while it ran"
     );
-    ensure!(pll < switch, "the core went over to a PLL that was off");
+    ensure!(pll < switch, "the core switched to a PLL that was off");
     ensure!(waits < switch, "the flash was too slow for the new clock");
     Ok("divisors, PLL, wait states, then the switch".into())
 }
@@ -185,7 +185,7 @@ fn converter(chip: &Chip) -> Result<String> {
         field(chip.value(ADC1 + 0x2C), 20, 4) == 0 && field(chip.value(ADC1 + 0x34), 0, 5) == 0,
         "not channel 0 alone"
     );
-    // JL = 0: the one conversion is JSQ4's.
+    // JL = 0: the single conversion is that of JSQ4.
     ensure!(
         field(chip.value(ADC1 + 0x38), 20, 2) == 0 && field(chip.value(ADC1 + 0x38), 15, 5) == 1,
         "not channel 1 after it"
@@ -213,7 +213,7 @@ fn pins(chip: &Chip) -> Result<String> {
     ensure!(functions == 0x77, "PA2, PA3 have functions {functions:#x}");
     ensure!(mode(GPIOA, 5) == 1, "LD2 is no output");
     ensure!(mode(GPIOC, 13) == 0, "B1 is no input");
-    // The probe's own pins stay as they were.
+    // The probe's own pins keep their state.
     ensure!([13, 14].map(|pin| mode(GPIOA, pin)) == [2, 2], "SWD is off");
     Ok("PA0 and PA1 analogue, PA2 and PA3 AF7, PA5 output, PC13 input, SWD as it was".into())
 }
@@ -234,7 +234,7 @@ fn valve(chip: &Chip) -> Result<String> {
     let clock = first(chip, "the crystal", |w| w.address == RCC_CR)?;
     ensure!(
         output < clock,
-        "the valve was not shut before anything was waited for"
+        "the valve was not closed before the first wait"
     );
     let raised = chip
         .written
@@ -247,7 +247,7 @@ fn valve(chip: &Chip) -> Result<String> {
 fn serial(chip: &Chip) -> Result<String> {
     let [_, apb1] = clocks(chip);
     let [rate, cr1, cr2, cr3] = [0x08, 0x0C, 0x10, 0x14].map(|offset| chip.value(USART2 + offset));
-    // Sixteen samples a bit, the divisor in sixteenths: together the clocks of a bit.
+    // Sixteen samples per bit, the divisor in sixteenths: together the clock cycles of a bit.
     ensure!(cr1 >> 15 & 1 == 0, "eight samples a bit");
     let baud = apb1 / f64::from(rate);
     ensure!((baud / 115_200.0 - 1.0).abs() < 0.01, "{baud} baud");
@@ -283,7 +283,7 @@ fn watchdog(chip: &Chip) -> Result<String> {
         "it waits {least} to {most} s"
     );
     Ok(format!(
-        "{:.0} to {:.0} ms of patience, whatever its clock",
+        "{:.0} to {:.0} ms until a restart, whatever its clock",
         1e3 * least,
         1e3 * most
     ))

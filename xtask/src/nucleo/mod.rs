@@ -1,7 +1,6 @@
-//! The Nucleo's own program on QEMU's STM32F405 (`netduinoplus2`), as near to the
-//! hardware as this can be without it. What that machine lacks is played through
-//! the debugger's port, register by register ([`chip`]); what the program sets up is
-//! held against the reference manual ([`manual`]).
+//! The Nucleo's own program on QEMU's STM32F405 (`netduinoplus2`), as close to the hardware as possible without it.
+//! The registers that the machine lacks are simulated through the debugger's port ([`chip`]). The program's
+//! register settings are checked against the reference manual ([`manual`]).
 
 mod chip;
 mod debugger;
@@ -29,14 +28,14 @@ pub(crate) const TASK: Task = Task {
 
 /// The converters' interrupt as QEMU names it.
 const CONVERTED: &str = "/machine/unattached/device[0]/adc-orirq unnamed-gpio-in 0";
-/// Where the core says which interrupts are enabled, and which of them the program takes.
+/// The registers with the enabled interrupts, and the interrupts that the program enables.
 const ENABLED: u32 = 0xE000_E100;
 const INTERRUPTS: [u32; 2] = [18, 38];
-/// How long the program may work without touching a register.
+/// Longest time for which the program may run without accessing a register.
 const PATIENCE: Duration = Duration::from_secs(120);
-/// The start is over when no register has been touched for so long.
+/// The start is over when no register has been accessed for this time.
 const QUIET: Duration = Duration::from_millis(300);
-/// What a sample leaves the program for its line.
+/// Time that a sample leaves the program for its serial line.
 const BETWEEN: Duration = Duration::from_millis(2);
 
 pub(crate) fn nucleo() -> Result<()> {
@@ -66,7 +65,7 @@ pub(crate) fn nucleo() -> Result<()> {
     Ok(())
 }
 
-/// One thing that is seen of the running program.
+/// One observation of the running program.
 type Step = (&'static str, fn(&mut Board) -> Result<String>);
 
 const STEPS: [Step; 5] = [
@@ -98,7 +97,7 @@ const STEPS: [Step; 5] = [
         Ok(format!("PB10 low two samples later, `{answer}`"))
     }),
     ("a broken wire", |board| {
-        // The flow is at rest again, as the model's is.
+        // The flow is at rest again, and so is the model.
         board.play(300)?;
         board.asked("arm", "armed")?;
         while !board.valve() {
@@ -115,7 +114,7 @@ const STEPS: [Step; 5] = [
         let answer = board.asked("status", "fault=at-rail")?;
         Ok(format!("PB10 low after {after} samples, `{answer}`"))
     }),
-    ("a converter that stands still", |board| {
+    ("a converter that stops", |board| {
         let fed = board.chip.fed;
         board.idle(Duration::from_millis(200))?;
         ensure!(board.chip.fed == fed, "the watchdog was fed");
@@ -123,7 +122,7 @@ const STEPS: [Step; 5] = [
     }),
 ];
 
-/// QEMU with the program, and what it lacks.
+/// QEMU with the program, and the simulated registers.
 struct Board {
     process: Child,
     debugger: Debugger,
@@ -181,22 +180,21 @@ impl Board {
         for word in Chip::words() {
             self.debugger.watch(word)?;
         }
-        // LD2's pin is the last that is set up; before it the self-test takes its time.
+        // LD2's pin is the last to be set up; before it the self-test runs.
         while field(self.chip.value(chip::GPIOA), 10, 2) != 1 {
             let access = self.run(PATIENCE)?;
-            ensure!(access.is_some(), "the program does not get to its loop");
+            ensure!(access.is_some(), "the program does not reach its loop");
         }
         self.idle(QUIET)
     }
 
-    /// Lets the program run until no register has been touched for `quiet`.
+    /// Runs the program until no register has been accessed for `quiet`.
     fn idle(&mut self, quiet: Duration) -> Result<()> {
         while self.run(quiet)?.is_some() {}
         Ok(())
     }
 
-    /// Lets the program run to its next access, and serves it; `None` if there was none
-    /// within `patience`.
+    /// Runs the program to its next access, and serves it; `None` if there was none within `patience`.
     fn run(&mut self, patience: Duration) -> Result<Option<u32>> {
         self.debugger.resume()?;
         let mut stop = self.debugger.stopped(patience)?;
@@ -213,8 +211,8 @@ impl Board {
         }
     }
 
-    /// The core is about to access the word at `address`: takes what it writes, or
-    /// puts what it should have read into its register.
+    /// The core is about to access the word at `address`: stores the value that it writes, or puts the value that
+    /// it reads into its register.
     fn serve(&mut self, address: u32) -> Result<()> {
         let at = self.debugger.register(15)? & !1;
         let bytes = self.debugger.memory(at, 4)?;
@@ -255,14 +253,15 @@ impl Board {
             } else {
                 800 + (2000.0 * self.friction) as u16 + noise as u16
             };
-            ensure!(
-                self.chip.convert([counts, 2048]),
-                "nothing is set up to convert"
-            );
+            ensure!(self.chip.convert([counts, 2048]), "no conversion is set up");
             self.raise()?;
             let fed = self.chip.fed;
-            // The button is asked for last; then the line is worked on.
-            while self.run(PATIENCE)?.context("the sample is never done")? != chip::GPIOC + 0x10 {}
+            // The button is read last; then the line is processed.
+            while self
+                .run(PATIENCE)?
+                .context("the sample is never completed")?
+                != chip::GPIOC + 0x10
+            {}
             self.idle(BETWEEN)?;
             ensure!(
                 self.chip.fed == fed + 1,
@@ -287,7 +286,7 @@ impl Board {
         Ok(())
     }
 
-    /// The operator types `line`; the answer that begins as `wanted`.
+    /// The operator types `line`; returns the answer that begins with `wanted`.
     fn asked(&mut self, line: &str, wanted: &str) -> Result<String> {
         self.serial.write_all(format!("\n{line}\n").as_bytes())?;
         let until = Instant::now() + Duration::from_secs(60);
@@ -298,7 +297,7 @@ impl Board {
             if let Ok(count) = self.serial.read(&mut buffer) {
                 heard.extend(buffer.iter().take(count));
             }
-            // Telemetry comes unasked, and begins with `t `.
+            // Telemetry is unsolicited and begins with `t `.
             let text = String::from_utf8_lossy(&heard);
             let whole = text.rsplit_once('\n').map_or("", |(whole, _)| whole);
             if let Some(answer) = whole.lines().find(|line| line.starts_with(wanted)) {

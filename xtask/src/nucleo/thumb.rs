@@ -1,5 +1,5 @@
-//! Which load or store the core is about to carry out: at a watchpoint the program
-//! counter stands before it, and its bytes say which register it is.
+//! Decodes the load or store that the core is about to execute. At a watchpoint the program counter points to it,
+//! and its bytes determine the register.
 
 /// A load or store of one register.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -12,11 +12,11 @@ pub(super) struct Access {
     pub(super) register: u8,
 }
 
-/// Of the four bytes from the program counter on.
+/// Decoded from the four bytes at the program counter.
 pub(super) fn access(code: [u8; 4]) -> Option<Access> {
     let [a, b, c, d] = code;
     let (first, second) = (u16::from_le_bytes([a, b]), u16::from_le_bytes([c, d]));
-    // How a long instruction begins (ARMv7-M, A5.1).
+    // Beginning of a long instruction (ARMv7-M, A5.1).
     if first >> 11 >= 0b11101 {
         long(first, second)
     } else {
@@ -25,8 +25,8 @@ pub(super) fn access(code: [u8; 4]) -> Option<Access> {
 }
 
 fn long(first: u16, second: u16) -> Option<Access> {
-    // LDR, STR and their narrow forms, all ways to address (A5.3.7 to A5.3.10);
-    // a sign does not matter, since no register of the chip has one.
+    // LDR, STR and their narrow forms, with all addressing modes (A5.3.7 to A5.3.10). Signed loads need no
+    // distinction, since no register of the chip is signed.
     let size = match (first >> 9, first >> 5 & 3) {
         (0b111_1100, 0) => 1,
         (0b111_1100, 1) => 2,

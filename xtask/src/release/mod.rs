@@ -1,6 +1,6 @@
-//! What a person without a compiler installs: an archive with the program, its completions, manual pages, licences and list
-//! of parts, and a Python wheel that carries the same. Each is tried after it was made. Nothing is asked of the network but
-//! crates that `cargo fetch` has not brought yet.
+//! Release files for people without a compiler: an archive with the program, its completions, manual pages,
+//! licences and list of parts, and a Python wheel with the same contents. Each is tested after it was made. The
+//! network is used only for crates that `cargo fetch` has not downloaded yet.
 
 mod notices;
 mod sbom;
@@ -14,11 +14,11 @@ use std::process::{Command, Stdio};
 
 pub(crate) const TASK: Task = Task {
     name: "release",
-    does: "makes target/release-files: archive, wheel, parts list, checksums; installs and tries them",
+    does: "makes target/release-files: archive, wheel, parts list, checksums; installs and tests them",
     run: release,
 };
 
-/// The project's files that the archive has beside the program.
+/// The project's files that the archive contains in addition to the program.
 const TEXTS: [&str; 5] = [
     "README.md",
     "CHANGELOG.md",
@@ -27,7 +27,7 @@ const TEXTS: [&str; 5] = [
     "LICENSE-APACHE",
 ];
 
-/// Shells, and how a script of each is called.
+/// Shells, and the file name of each script.
 const SHELLS: [(&str, &str); 3] = [
     ("bash", "host-fit.bash"),
     ("zsh", "_host-fit"),
@@ -74,7 +74,7 @@ fn make() -> Result<Made> {
     let unpacked = folder.join(&name);
     std::fs::create_dir_all(unpacked.join("completions"))?;
     std::fs::create_dir_all(unpacked.join("man"))?;
-    // Lines of sources are for those who compile.
+    // Lines on building from source are removed.
     run(command("strip", &["-o"])
         .arg(unpacked.join("host-fit"))
         .arg(&built))?;

@@ -1,10 +1,10 @@
-//! The licences of what others wrote and the program carries, as they ask for it: the text of each, and whose it is.
+//! The licences of the third-party code in the program: the text of each, and its owners.
 
 use super::sbom::{Package, Parts};
 use anyhow::{Context, Result};
 use std::collections::BTreeMap;
 
-/// Beginnings of the names of files with a licence.
+/// Beginnings of the names of licence files.
 const NAMES: [&str; 5] = ["licen", "copying", "notice", "unlicense", "copyright"];
 
 /// The text: equal licences once, after the names of their crates.
@@ -31,9 +31,11 @@ pub(super) fn text(parts: &Parts) -> Result<String> {
         .collect();
     sections.sort();
     let rule = format!("\n{}\n\n", "-".repeat(80));
-    let mut text = "The program carries these crates. The report pages carry uPlot, whose licence stands in them.\n".to_owned();
+    let mut text =
+        "The program contains these crates. The report pages contain uPlot, with its licence.\n"
+            .to_owned();
     if !unsaid.is_empty() {
-        text.push_str("\nWithout a licence's text in their packages:\n");
+        text.push_str("\nPackages without the text of their licence:\n");
         text.push_str(&unsaid.join("\n"));
         text.push('\n');
     }

@@ -1,4 +1,4 @@
-//! What the program is made of, as CycloneDX 1.5: every crate of its tree with version, licence and checksum.
+//! The parts of the program, as CycloneDX 1.5: every crate of its tree with version, licence and checksum.
 
 use crate::shell::{cargo, output, root};
 use anyhow::{Context, Result, ensure};
@@ -21,7 +21,7 @@ pub(super) struct Package {
     pub(super) name: String,
     pub(super) version: String,
     pub(super) license: Option<String>,
-    /// None where it is of this project.
+    /// `None` if it belongs to this project.
     pub(super) source: Option<String>,
     pub(super) manifest_path: PathBuf,
 }
@@ -43,7 +43,7 @@ struct Edge {
     dep_kinds: Vec<Kind>,
 }
 
-/// None where the crate is part of the program; "dev" and "build" otherwise.
+/// `None` if the crate is part of the program; "dev" and "build" otherwise.
 #[derive(Deserialize)]
 struct Kind {
     kind: Option<String>,
@@ -62,7 +62,7 @@ struct Locked {
     checksum: Option<String>,
 }
 
-/// The crates that the program is made of on the target `triple`, and the checksums of all.
+/// The crates of the program for the target `triple`, and the checksums of all.
 pub(super) struct Parts {
     metadata: Metadata,
     lock: Lock,
@@ -86,7 +86,7 @@ impl Parts {
         })
     }
 
-    /// Everything that is reached from the program, by name, without what only tests and builds need.
+    /// Everything reachable from the program, by name, without the dependencies of tests and builds.
     pub(super) fn crates(&self) -> Result<Vec<&Package>> {
         let program = self.program()?;
         let (mut reached, mut open) = (BTreeSet::new(), vec![program.id.as_str()]);
@@ -132,7 +132,7 @@ impl Parts {
             .collect()
     }
 
-    /// The document. It has neither a time nor a number of its own: the same tree gives the same bytes.
+    /// The document. It contains neither a time nor a serial number: the same tree gives the same bytes.
     pub(super) fn document(&self) -> Result<String> {
         Ok(serde_json::to_string_pretty(&self.bom()?)? + "\n")
     }
@@ -180,7 +180,7 @@ impl Parts {
     }
 }
 
-/// What the report pages are made of, which the program carries.
+/// The parts of the report pages, which the program contains.
 fn pages(lock: &Value) -> Result<Vec<Value>> {
     let packages = lock["packages"]
         .as_object()

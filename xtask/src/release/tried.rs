@@ -1,4 +1,5 @@
-//! What was made, as a stranger takes it: unpacked or installed elsewhere, without the project's sources.
+//! Tests of the release files as a user would use them: unpacked or installed elsewhere, without the project's
+//! sources.
 
 use super::{Made, NOTICES, PARTS, SHELLS, TEXTS};
 use crate::shell::{command, exists, output, root, run};
@@ -10,7 +11,7 @@ use std::process::Command;
 /// Lines of the README that install the wheel and use it: this one and the two below it.
 const FIRST_LINE: &str = "    pip install ";
 
-/// A folder that is gone when the trial is over.
+/// A folder that is removed when the trial ends.
 struct Elsewhere(PathBuf);
 
 impl Elsewhere {
@@ -106,7 +107,7 @@ pub(super) fn archive(made: &Made) -> Result<()> {
     Ok(())
 }
 
-/// Asks bash as its Tab key does.
+/// Requests completions from bash as its Tab key does.
 fn completes(unpacked: &Path, folder: &Path) -> Result<()> {
     std::fs::write(folder.join("model.toml"), "")?;
     for (words, expected) in [
@@ -115,7 +116,7 @@ fn completes(unpacked: &Path, folder: &Path) -> Result<()> {
         (&["host-fit", "simulate", "mod"], "model.toml"),
         (&["host-fit", "codegen", "--lang", "py"], "python"),
     ] {
-        // Where a script offers nothing, `-o default` has bash offer files.
+        // If a script offers nothing, `-o default` makes bash offer files.
         let (last, before) = (words.len() - 1, words.len() - 2);
         let ask = format!(
             "shopt -s progcomp; . \"$1\"; shift; COMP_WORDS=(\"$@\"); COMP_CWORD={last}\n\
@@ -138,7 +139,7 @@ fn completes(unpacked: &Path, folder: &Path) -> Result<()> {
     Ok(())
 }
 
-/// The README's recipe in a fresh virtual environment, where nothing can be fetched.
+/// The README's recipe in a fresh virtual environment without network access.
 pub(super) fn wheel(made: &Made) -> Result<()> {
     let readme = std::fs::read_to_string(root().join("README.md"))?;
     let lines = readme
@@ -157,10 +158,10 @@ pub(super) fn wheel(made: &Made) -> Result<()> {
     let folder = &elsewhere.0;
     let environment = folder.join("venv");
     let python = crate::setup::python()?;
-    // NumPy is the system's: it is not fetched for this.
+    // NumPy is the system's and is not downloaded.
     run(command(python, &["-m", "venv", "--system-site-packages"]).arg(&environment))?;
     std::fs::create_dir_all(folder.join("out/demo"))?;
-    // In place of the demo's, which takes a minute.
+    // Instead of the demo's model, which takes a minute.
     std::fs::copy(
         root().join("data/paper/table-2-state-dependent.toml"),
         folder.join("out/demo/hidden-after.toml"),
@@ -220,10 +221,10 @@ pub(super) fn wheel(made: &Made) -> Result<()> {
     said("pip uninstall --yes host-fit")?;
     ensure!(
         !environment.join("bin/host-fit").exists(),
-        "it stays when it is uninstalled"
+        "it remains after it was uninstalled"
     );
     println!(
-        "wheel: installed, exported, simulated: y = {last} after 2000 samples, as the program says"
+        "wheel: installed, exported, simulated: y = {last} after 2000 samples, equal to the program's"
     );
     Ok(())
 }

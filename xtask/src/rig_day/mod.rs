@@ -14,7 +14,7 @@ use std::time::Instant;
 
 pub(crate) const TASK: Task = Task {
     name: "rig-day",
-    does: "the whole circle at a simulated rig behind the board under QEMU: --short, --brief (as CI), --page writes docs/rig-day.md",
+    does: "the whole workflow on a simulated rig with the board under QEMU: --short, --brief (as CI), --page writes docs/rig-day.md",
     run: rig_day,
 };
 

@@ -1,4 +1,4 @@
-//! Effects with other laws than the catalogue's, as on real rigs.
+//! Effects with other equations than the catalogue's, as on real rigs.
 //!
 //! Each resembles an effect of the catalogue, whose name is then a correct diagnosis.
 
@@ -24,7 +24,7 @@ use super::effects::{
 use super::part::{Part, Place, Surroundings};
 
 catalogue! {
-    /// An effect with another law than the catalogue's.
+    /// An effect with another equation than the catalogue's.
     Altered {
         clamped_delay::ClampedDelay,
         second_order_valve::SecondOrderValve,

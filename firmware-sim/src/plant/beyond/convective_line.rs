@@ -11,7 +11,7 @@ use crate::plant::effects::{Card, Limits, Physics};
 use crate::plant::free_stream::FreeStream;
 use crate::plant::part::{Part, Place, Surroundings};
 
-/// way·(Ū/U)^exponent on top of the transport delay, U the measured free stream when it sets out.
+/// way·(Ū/U)^exponent in addition to the transport delay, U the measured free stream at the start of the transport.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ConvectiveLine {
     /// Convection time at the mean free stream (s).

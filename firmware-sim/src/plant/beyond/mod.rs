@@ -32,7 +32,7 @@ use super::effects::{
 };
 use super::part::{Part, Place, Surroundings};
 
-/// Place of a term, in the words of a finding.
+/// Place of a term, in the words of `discover`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Port {
     /// The jet's strength.
@@ -69,7 +69,7 @@ pub struct Region {
 pub struct Truth {
     /// The place.
     pub port: Port,
-    /// Coordinates in the words of a finding: the first is the true one, the others are equivalent for given
+    /// Coordinates in the words of `discover`: the first is the true one, the others are equivalent for given
     /// commands and readings. A time in brackets is the rig's (s); without one any time is accepted.
     pub coordinates: Vec<String>,
     /// The region outside of which it has no effect, if limited.
@@ -112,7 +112,7 @@ macro_rules! beyond {
         }
 
         impl Beyond {
-            /// Channel of the air temperature (°C), beside that of the free stream.
+            /// Channel of the air temperature (°C), in addition to that of the free stream.
             pub const TEMPERATURE: &'static str = "temperature";
 
             /// The term to be found.

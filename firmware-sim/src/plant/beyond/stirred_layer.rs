@@ -99,7 +99,7 @@ mod tests {
     use super::*;
     use crate::plant::flow::bench::{flow, hold};
 
-    /// With increasing rest the blowing time in the window decreases; here not yet.
+    /// With increasing rest the blowing time in the window decreases; at this time it does not yet.
     #[test]
     fn recent_blowing_sets_the_rate() {
         let law = StirredLayer {

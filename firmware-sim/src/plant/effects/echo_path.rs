@@ -45,7 +45,7 @@ impl Physics for EchoPath {
     }
 }
 
-/// (t + d) − d may round to either side of t; the echo of a jump must be read on the correct side (s).
+/// (t + d) − d may be rounded to either side of t; the echo of a jump must be read on the correct side (s).
 const RETURN_SLACK_S: f64 = SHORTEST_PIECE_S;
 
 #[derive(Debug, Clone)]
@@ -54,7 +54,7 @@ struct Echo {
     delay_s: f64,
     direct: Waveform,
     cursor: Cursor,
-    /// Times at which the jumps of the direct jet return.
+    /// Times at which the echoes of the direct jet's jumps arrive.
     returning: VecDeque<f64>,
 }
 

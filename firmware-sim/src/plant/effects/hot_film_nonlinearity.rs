@@ -25,7 +25,7 @@ impl Physics for HotFilmNonlinearity {
             Limits::new(
                 f64::MIN_POSITIVE,
                 f64::MAX,
-                "above 0 (at 0 the film feels no flow)",
+                "above 0 (at 0 the film does not respond to the flow)",
             ),
             |e| &mut e.king_ratio,
         ),

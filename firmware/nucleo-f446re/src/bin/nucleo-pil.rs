@@ -1,5 +1,5 @@
-//! The processor in the loop: answers the host's lockstep requests over the
-//! ST-LINK's serial port. The valve stays shut.
+//! The processor in the loop: answers the host's lockstep requests over the ST-LINK's serial port. The valve stays
+//! closed.
 #![no_std]
 #![no_main]
 

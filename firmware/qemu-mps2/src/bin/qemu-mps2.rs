@@ -1,12 +1,10 @@
-//! The loop on QEMU's mps2-an386, with a flow that the model itself plays, a
-//! measured channel at its reference, and faults that are injected over the
-//! serial line.
+//! The loop on QEMU's mps2-an386, with a flow simulated by the model itself, a measured channel at its reference,
+//! and faults that are injected over the serial line.
 //!
-//! Lines: `arm`, `disarm`, `status`; and for the fault-injection run a digit:
-//! `0` a healthy sensor, `1` no number, `2` at the rail, `3` stuck, `4` away
-//! from the model, `c` a channel that gives no number, `5` a sample that takes longer than a period, `6` a loop that
-//! hangs, `7` and `8` a restart with a damaged coefficient and a damaged golden
-//! trajectory, `9` a restart with nothing damaged.
+//! Lines: `arm`, `disarm`, `status`; for fault injection a digit: `0` a healthy sensor, `1` NaN, `2` at the rail,
+//! `3` stuck, `4` away from the model, `c` a channel of NaN, `5` a sample that takes longer than a period, `6` a
+//! loop that hangs, `7` and `8` a restart with a damaged coefficient and a damaged reference trajectory, `9` a
+//! restart without damage.
 #![no_std]
 #![no_main]
 
@@ -171,7 +169,7 @@ unsafe fn NonMaskableInt() -> ! {
 
 /// The self-test with the injected damage.
 fn self_test(model: model::Identified) -> Result<(), start::Failure> {
-    // SAFETY: the word is in RAM, any bits are a u32, and nothing runs beside.
+    // SAFETY: the word is in RAM, any bits are a valid u32, and nothing runs concurrently.
     let damage = unsafe { addr_of!(DAMAGE).cast::<u32>().read_volatile() };
     let (state, references) = (model::state(&model), &model::REFERENCES);
     let mut golden = model::GOLDEN;

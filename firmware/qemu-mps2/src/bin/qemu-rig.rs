@@ -1,10 +1,9 @@
-//! The loop on QEMU's mps2-an386 with a rig on the host behind its second serial
-//! line, in the place of converter and pins.
+//! The loop on QEMU's mps2-an386 with a rig on the host behind its second serial line, instead of converter and
+//! pins.
 //!
-//! The rig is the sample clock, as the converter is on a real board: for every
-//! sample it sends four bytes, [`PRESSED`] or 0 for the reset button and 12 bits
-//! each of sensor and channel, and gets one, 1 for an open valve. However fast
-//! that goes, the line to the host takes what 115 200 baud take in a period.
+//! The rig is the sample clock, like the converter of a real board. For every sample it sends four bytes:
+//! [`PRESSED`] or 0 for the reset button, and 12 bits each of sensor and channel. It receives one byte, 1 for an
+//! open valve. However fast the samples are, the line to the host transmits as much as 115 200 baud in a period.
 #![no_std]
 #![no_main]
 
@@ -83,8 +82,8 @@ fn main() -> ! {
     let mut outbox = Outbox::new();
     loop {
         to_rig.send(&[valve.get().into()]);
-        // A real line would deliver about a hundred bytes in a long period: here they arrive while the board
-        // waits for the rig.
+        // A real line would deliver about a hundred bytes in a long period; here they arrive while the board waits
+        // for the rig.
         let [button, low, mixed, high] = core::array::from_fn(|_| {
             to_rig.wait_beside(|| {
                 if let Some(byte) = line.receive() {

@@ -11,7 +11,7 @@ use model_core::effect::Place;
 use model_core::recursion::Grading;
 use std::fmt::Write as _;
 
-/// Lags of at least this many samples are summed first where the law looks ahead, as `model-core` does.
+/// Lags of at least this many samples are summed first when the law predicts, as in `model-core`.
 const NEAR: usize = 64;
 
 pub(super) struct C {
@@ -96,7 +96,7 @@ fn length(line: &str) -> String {
     format!("{}_LENGTH", line.to_uppercase())
 }
 
-/// Functions with the names by which they are called, each after those that it calls.
+/// Functions by name, each after those that it calls.
 fn helpers(precision: Precision) -> Vec<(&'static str, String)> {
     let core = include_str!("core.c")
         .split("//:")
@@ -158,10 +158,10 @@ fn heading(sheet: &Sheet<'_>, precision: Precision) -> String {
     };
     let _ = write!(
         text,
-        " *\n * model_step takes the command of a sample and gives the sensor's reading at it; the model then moves on.\n \
-         * Bit for bit what the host computes with IEEE numbers and without fused products: -std=c99 -ffp-contract=off.\n */\n\
+        " *\n * model_step takes the command of a sample, returns the sensor's reading at that sample, and advances the model.\n \
+         * Bit-identical to the host with IEEE numbers and without fused multiply-add: -std=c99 -ffp-contract=off.\n */\n\
          #include <math.h>\n#include <stddef.h>\n#include <stdint.h>\n\n\
-         typedef {kind} real;\n\n/* For a header of yours. */\n"
+         typedef {kind} real;\n\n/* Declarations for your header. */\n"
     );
     if !sheet.memory.channels.is_empty() {
         let names: Vec<String> = sheet
@@ -183,11 +183,11 @@ fn heading(sheet: &Sheet<'_>, precision: Precision) -> String {
     match sheet.law() {
         Some(Law::Track(_)) => text.push_str(
             "struct law_decision {\n    int on;          /* the valve until the next sample */\n    \
-             real reference;  /* in force, y */\n    real foreseen;   /* flow where the decision arrives, y */\n    \
+             real reference;  /* reference now, y */\n    real foreseen;   /* predicted flow at the arrival of the decision, y */\n    \
              uint32_t delay;  /* from now to that arrival, samples */\n    real estimate;   /* flow now, y */\n    \
-             real residual;   /* reading minus what the model shows, y */\n    real bias;       /* of predictions, y */\n    \
+             real residual;   /* reading minus the model's output, y */\n    real bias;       /* mean error of the predictions, y */\n    \
              uint32_t lost;   /* samples without a reading */\n};\nvoid law_reset(void);\n\
-             /* A reading that is NaN is none. */\n\
+             /* A reading of NaN counts as missing. */\n\
              struct law_decision law_step(real reading, const real *channels);\n",
         ),
         Some(Law::Maximise(_)) => text.push_str("void law_reset(void);\nint law_step(void);\n"),
@@ -239,22 +239,22 @@ fn constants(sheet: &Sheet<'_>, c: &C) -> String {
     );
     let _ = writeln!(
         w,
-        "#define OUTPUTS {}u /* flows kept, samples */",
+        "#define OUTPUTS {}u /* stored flow states, samples */",
         sheet.memory.outputs
     );
     let _ = writeln!(
         w,
-        "#define JETS {}u /* jets kept, samples */",
+        "#define JETS {}u /* stored jet strengths, samples */",
         sheet.memory.jets
     );
     let _ = writeln!(
         w,
-        "#define WINDOW {}u /* of averages, samples */",
+        "#define WINDOW {}u /* length of averages, samples */",
         model.averaging.window
     );
     let _ = writeln!(
         w,
-        "#define HELD {}u /* samples lived through by model_hold */",
+        "#define HELD {}u /* samples that model_hold simulates */",
         sheet.held
     );
     let _ = writeln!(w, "#define SENSOR_ZERO {} /* y */", c.number(sheet.zero));
@@ -264,8 +264,8 @@ fn constants(sheet: &Sheet<'_>, c: &C) -> String {
         let order = order.map_or("UINT32_MAX".into(), |order| format!("{order}u"));
         let _ = writeln!(
             w,
-            "#define RATE_OFF {} /* of the separated flow, 1/sample */\n#define RATE_ON {} /* of the attached flow */\n\
-             #define ORDER {order} /* lags below this are the flow's own */",
+            "#define RATE_OFF {} /* relaxation rate of the separated flow, 1/sample */\n#define RATE_ON {} /* relaxation rate of the attached flow */\n\
+             #define ORDER {order} /* lags below this count for the relaxation rates */",
             c.number(off),
             c.number(on)
         );
@@ -357,7 +357,7 @@ fn constants(sheet: &Sheet<'_>, c: &C) -> String {
     text
 }
 
-/// In parentheses where a sign could meet another.
+/// In parentheses if its sign could follow another sign.
 fn signed(c: &C, value: f64) -> String {
     let number = c.number(value);
     if number.starts_with('-') {
@@ -382,14 +382,14 @@ fn model(sheet: &Sheet<'_>, c: &C) -> String {
         let _ = writeln!(
             w,
             "\nconst char *const model_channels[MODEL_CHANNELS] = {{ {} }};\n\
-             static const real USUAL[MODEL_CHANNELS] = {{ {} }}; /* where no channels are given */",
+             static const real USUAL[MODEL_CHANNELS] = {{ {} }}; /* used if no channels are given */",
             names.join(", "),
             numbers(c, &usual)
         );
     }
-    w.push_str("\nstruct model {\n    real y[2u * OUTPUTS]; /* flows, each twice */\n    uint32_t y_newest;\n    real jets[2u * JETS];\n    uint32_t jets_newest;\n");
+    w.push_str("\nstruct model {\n    real y[2u * OUTPUTS]; /* flow states, each stored twice */\n    uint32_t y_newest;\n    real jets[2u * JETS];\n    uint32_t jets_newest;\n");
     if sheet.follows && !model.averaging.averaged_model {
-        w.push_str("    real sum, sum_low, fresh, fresh_low; /* of the window, each in two words */\n    uint32_t in_block;\n");
+        w.push_str("    real sum, sum_low, fresh, fresh_low; /* sums over the window, each in two words */\n    uint32_t in_block;\n");
     }
     if sheet.clocked {
         w.push_str("    uint32_t lived, since_edge;\n    real last_command;\n");
@@ -406,7 +406,7 @@ fn model(sheet: &Sheet<'_>, c: &C) -> String {
             );
         }
     }
-    w.push_str("};\n\n/* Everything was 0 before the first sample. */\nstatic void at_rest(struct model *s)\n{\n    static const struct model zero;\n    *s = zero;\n");
+    w.push_str("};\n\n/* All signals are 0 before the first sample. */\nstatic void at_rest(struct model *s)\n{\n    static const struct model zero;\n    *s = zero;\n");
     if sheet.clocked {
         w.push_str("    s->since_edge = 16777216u;\n");
     }
@@ -422,13 +422,13 @@ fn model(sheet: &Sheet<'_>, c: &C) -> String {
     }
     observe(sheet, c, w);
     let average = sheet.follows && !model.averaging.averaged_model;
-    w.push_str("\n/* Makes `flow` the newest one. */\nstatic void advance(struct model *s, real flow)\n{\n");
+    w.push_str("\n/* Stores `flow` as the newest flow state. */\nstatic void advance(struct model *s, real flow)\n{\n");
     if average {
         w.push_str("    slide(s, back(s->y, OUTPUTS, s->y_newest, 0u), back(s->y, OUTPUTS, s->y_newest, WINDOW - 1u));\n");
     }
     w.push_str("    push(s->y, OUTPUTS, &s->y_newest, flow);\n}\n");
     if matches!(sheet.law(), Some(Law::Track(_))) {
-        w.push_str("\n/* The same where the law looks ahead, with less care of the average. */\nstatic void foresee(struct model *s, real flow, real next)\n{\n");
+        w.push_str("\n/* The same for predictions of the law, with a less accurate average. */\nstatic void foresee(struct model *s, real flow, real next)\n{\n");
         if average {
             w.push_str("    s->sum_low = s->sum_low + (flow - back(s->y, OUTPUTS, s->y_newest, WINDOW - 1u));\n");
         } else {
@@ -451,14 +451,14 @@ fn model(sheet: &Sheet<'_>, c: &C) -> String {
     let _ = write!(
         w,
         "\nstatic struct model the_model;\nstatic int begun;\n\n\
-         /* Back to the first sample: everything was 0 before. */\n\
+         /* Restarts at the first sample; all signals before it are 0. */\n\
          void model_reset(void)\n{{\n    at_rest(&the_model);\n    begun = 1;\n}}\n\n\
-         /* Instead: command and reading were these for long before the first sample. */\n\
+         /* Restarts with a constant command and reading before the first sample. */\n\
          void model_hold(real command, real reading, const real *channels)\n{{\n    uint32_t i;\n    model_reset();\n    \
          for (i = 0u; i < HELD; i++) {{\n        advance(&the_model, reading - SENSOR_ZERO);\n        \
          (void)observe(&the_model, {share}, channels != NULL ? channels : {usual}, 0);\n    }}\n    \
          advance(&the_model, reading - SENSOR_ZERO);\n}}\n\n\
-         /* The reading at this sample, under the command from now to the next one{}. */\n\
+         /* Returns the reading at this sample and advances the model; the command{} holds until the next sample. */\n\
          real model_step(real command, const real *channels)\n{{\n    struct seen seen;\n    if (begun == 0) {{\n        \
          model_reset();\n    }}\n    seen = observe(&the_model, {share}, channels != NULL ? channels : {usual}, 0);\n    \
          advance(&the_model, seen.next);\n    return seen.measured;\n}}\n",
@@ -466,7 +466,7 @@ fn model(sheet: &Sheet<'_>, c: &C) -> String {
             String::new()
         } else {
             format!(
-                ": {:?} for no jet, {:?} for a full one",
+                " ({:?} for no jet, {:?} for a full jet)",
                 range.off, range.full
             )
         }
@@ -483,7 +483,7 @@ static void add_to(real *high, real *low, real term)
     *high = sum;
 }
 
-/* Moves the window of the average on by a sample. The sum of every block is formed afresh: it does not drift. */
+/* Advances the window of the average by a sample. The sum of every block is computed anew, so it does not drift. */
 static void slide(struct model *s, real entering, real leaving)
 {
     add_to(&s->fresh, &s->fresh_low, entering);
@@ -505,13 +505,13 @@ static void slide(struct model *s, real entering, real leaving)
 fn recursion(sheet: &Sheet<'_>, w: &mut String) {
     if sheet.graded() {
         if sheet.model.grading == Grading::Switched {
-            w.push_str("\n/* The share of the attached flow's rate. */\nstatic real share_of(real jet)\n{\n    const real half = ONE / (ONE + ONE);\n    return at_most(at_least(half + (jet - half) * (real)50.0, ZERO), ONE);\n}\n");
+            w.push_str("\n/* The weight of the attached flow's rate. */\nstatic real share_of(real jet)\n{\n    const real half = ONE / (ONE + ONE);\n    return at_most(at_least(half + (jet - half) * (real)50.0, ZERO), ONE);\n}\n");
         } else {
-            w.push_str("\n/* The share of the attached flow's rate. */\nstatic real share_of(real jet) { return jet; }\n");
+            w.push_str("\n/* The weight of the attached flow's rate. */\nstatic real share_of(real jet) { return jet; }\n");
         }
         w.push_str(
             "
-/* The flow at the next sample. Lags from `horizon` on are summed first. */
+/* The flow at the next sample. Lags of at least `horizon` are summed first. */
 static real next_flow(const struct model *s, const real *jets, uint32_t horizon)
 {
     const real jet = jets[0];
@@ -574,7 +574,7 @@ static real next_flow(const struct model *s, const real *jets, uint32_t horizon)
 /* The flow at the next sample",
     );
     w.push_str(if far {
-        ". Lags from `horizon` on are summed first"
+        ". Lags of at least `horizon` are summed first"
     } else {
         ""
     });
@@ -671,7 +671,7 @@ struct seen {
     uint32_t nearest;  /* the shortest input delay, samples */
 };
 
-/* What happens at a sample; the flow does not move on. Where the law `looks` ahead no sensor is asked. */
+/* Computes one sample without advancing the flow. If the law `looks` ahead, the sensor is not evaluated. */
 static struct seen observe(struct model *s, real u, const real *channels, int looks)
 {
     struct seen seen;
@@ -687,7 +687,7 @@ static struct seen observe(struct model *s, real u, const real *channels, int lo
     w.push_str("    seen.nearest = UINT32_MAX;\n");
     if let Some(command) = sheet.transport.as_ref().and_then(|t| t.command.as_ref()) {
         let (lines, value) = command.statements(c);
-        w.push_str("    { /* edges held back */\n        const real signal = jet;\n");
+        w.push_str("    { /* delayed edges */\n        const real signal = jet;\n");
         for line in lines {
             let _ = writeln!(w, "        {line}");
         }
@@ -703,7 +703,7 @@ static struct seen observe(struct model *s, real u, const real *channels, int lo
             w.push_str(if model.averaging.averaged_model {
                 "        const real signal = at_least(y, ZERO);\n"
             } else {
-                "        /* The mean of the flows before this one, eq. (1). */\n        const real signal = at_least((s->sum + s->sum_low) / (real)WINDOW, ZERO);\n"
+                "        /* The mean of the preceding flow states, eq. (1). */\n        const real signal = at_least((s->sum + s->sum_low) / (real)WINDOW, ZERO);\n"
             });
         }
         let (lines, value) = transport.effect.piece.statements(c);
@@ -771,7 +771,7 @@ static struct seen observe(struct model *s, real u, const real *channels, int lo
         };
         let _ = write!(
             w,
-            "    {{ /* effects of the flow: each sees the motion with those before it */\n        \
+            "    {{ /* effects of the flow: each uses the motion with the preceding effects */\n        \
              static const real NO_JETS[N3] = {{ ZERO }};\n        const real before = back(s->y, OUTPUTS, s->y_newest, 1u);\n        \
              const real part = {share};\n        const real relaxation = RATE_OFF + (RATE_ON - RATE_OFF) * part;\n        \
              const real separated = (part == ZERO || part == ONE || relaxation == ZERO) ? ONE - part : (ONE - part) * RATE_OFF / relaxation;\n        \
@@ -791,7 +791,7 @@ static struct seen observe(struct model *s, real u, const real *channels, int lo
         w.insert_str(
             at,
             "
-/* The mean of a window of jets, the newest of them `lag` back, eq. (13). */
+/* The mean of a window of jets, the newest of them `lag` samples back, eq. (13). */
 static real mean_jet(const struct model *s, uint32_t lag)
 {
     real sum = ZERO;
@@ -863,7 +863,7 @@ pub(super) fn reals<T: Real>(track: &Track) -> Vec<(&'static str, f64, &'static 
         (
             "LAW_SETTLED",
             law.settled.value(),
-            "share of the integral's rate in the long run",
+            "long-term share of the integral's rate",
         ),
         ("LAW_CORRECTION_LIMIT", law.correction_limit.value(), "y"),
         ("LAW_RESIDUAL_LIMIT", law.residual_limit.value(), "y"),

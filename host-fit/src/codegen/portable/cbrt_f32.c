@@ -1,4 +1,4 @@
-/* The cube root, the host's (FreeBSD's s_cbrtf.c). Copyright (C) 1993 by Sun Microsystems, Inc. All rights reserved.
+/* The cube root as on the host (FreeBSD's s_cbrtf.c). Copyright (C) 1993 by Sun Microsystems, Inc. All rights reserved.
  * Permission to use, copy, modify, and distribute this software is freely granted, provided that this notice is preserved. */
 static real cube_root(real x)
 {

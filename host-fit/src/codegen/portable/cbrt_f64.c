@@ -1,4 +1,4 @@
-/* The cube root, rounded correctly as the host's is: one step of Newton's method with the residual in two words. */
+/* The cube root, correctly rounded as on the host: one step of Newton's method with the residual in two words. */
 static real cube_root(real x)
 {
     const double y = cbrt(x);

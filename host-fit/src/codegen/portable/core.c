@@ -7,7 +7,7 @@ static real magnitude(real x) { return x < ZERO ? -x : x; }
 //:root
 static real root(real x) { return x > ZERO ? REAL_SQRT(x) : ZERO; }
 //:truncated
-/* The whole part, within the bounds of 32 bits; 0 for what is no number. */
+/* The integer part, limited to 32 bits; 0 for NaN. */
 static int32_t truncated(real x)
 {
     int32_t whole = 0;
@@ -46,7 +46,7 @@ CUBE_ROOT
 //:sine_of
 SINE
 //:back
-/* The sample `lag` samples before the newest; every sample is kept twice, so that the past lies in one piece. */
+/* The sample `lag` samples before the newest; every sample is stored twice, so that the past is contiguous. */
 static real back(const real *samples, uint32_t length, uint32_t newest, uint32_t lag)
 {
     return lag < length ? samples[newest + length - lag] : ZERO;
@@ -59,7 +59,7 @@ static void push(real *samples, uint32_t length, uint32_t *newest, real value)
     samples[*newest + length] = value;
 }
 //:between
-/* The past `samples` samples ago, straight from one sample to the next. */
+/* The value `samples` samples ago, with linear interpolation. */
 static real between(const real *line, uint32_t length, uint32_t newest, uint32_t whole, real fraction)
 {
     const real newer = back(line, length, newest, whole);

@@ -25,7 +25,7 @@ def _cos(x):
 
 #:_divided
 def _divided(x, y):
-    """As numbers of IEEE 754 are divided: by 0 too."""
+    """Division by IEEE 754, also by 0."""
     return x / y if y != 0.0 else float(np.divide(np.float64(x), np.float64(y)))
 
 
@@ -38,7 +38,7 @@ def _push(line, value, length):
 
 #:_ago
 def _ago(line, samples):
-    """The past `samples` samples ago, straight from one sample to the next."""
+    """The value `samples` samples ago, with linear interpolation."""
     samples = max(samples, 0.0)
     whole = int(samples)
     return line[-1 - whole] + (samples - whole) * (line[-2 - whole] - line[-1 - whole])

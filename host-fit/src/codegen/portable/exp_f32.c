@@ -1,4 +1,4 @@
-/* e to the power x, the host's: after S. Moshier's Cephes library. */
+/* e to the power x as on the host, after S. Moshier's Cephes library. */
 static real exponential(real x)
 {
     static const float series[6] = {

@@ -1,4 +1,4 @@
-/* e to the power x, the host's (FreeBSD's e_exp.c).
+/* e to the power x as on the host (FreeBSD's e_exp.c).
  * Copyright (C) 2004 by Sun Microsystems, Inc. All rights reserved.
  * Permission to use, copy, modify, and distribute this software is freely granted, provided that this notice is preserved. */
 static real exponential(real x)

@@ -2,7 +2,7 @@
 /* ---- the law: it holds the flow at a reference with an on/off valve ---- */
 
 static struct {
-    struct model model;      /* at the estimate of the present */
+    struct model model;      /* in the estimated present state */
     real predictions[LAW_LEAD + 1u]; /* of the flow, LAW_LEAD samples ahead */
     uint32_t newest;
     real bias, missed, integral, share, learned, reference;
@@ -10,7 +10,7 @@ static struct {
     int on, begun;
 } law;
 
-static struct model ahead; /* the same, run on into the future */
+static struct model ahead; /* the same, for the prediction */
 
 static uint32_t add(uint32_t x, uint32_t y) { return x > UINT32_MAX - y ? UINT32_MAX : x + y; }
 
@@ -50,7 +50,7 @@ struct look {
     uint32_t delay;
 };
 
-/* Runs the model on with the valve at `on` from now, until half a hold time after that arrives. */
+/* Predicts the flow with the valve at `on` from now, until half a hold time after the arrival of `on`. */
 static struct look look_ahead(int on, const real *channels)
 {
     struct look look;
@@ -81,7 +81,7 @@ static struct look look_ahead(int on, const real *channels)
             } else if (near == 0u && arrived_for == 1u) {
                 look.foreseen = seen.flow;
             } else {
-                /* foreseen already */
+                /* predicted already */
             }
             enough = arrived_for >= far && i + 1u >= LAW_LEAD;
             if (enough != 0 && far > near) {
@@ -92,7 +92,7 @@ static struct look look_ahead(int on, const real *channels)
     return look;
 }
 
-/* What the budgets of switches and air make of a wish. */
+/* The wanted position, limited by the budgets of switches and air. */
 static int allowed(int wanted)
 {
     int yes = wanted;
@@ -103,7 +103,7 @@ static int allowed(int wanted)
     } else if (law.on != 0 && wanted != 0) {
         yes = LAW_AIR_CAPACITY == 0u || law.air >= LAW_AIR_DRAIN;
     } else {
-        /* shut */
+        /* closed */
     }
     return yes;
 }
@@ -124,7 +124,7 @@ static void correct(real estimate, int has_reading, real residual, real at_lead)
         return;
     }
     flow = estimate + residual;
-    /* The oldest one is where the next will be. */
+    /* The oldest one is overwritten by the next. */
     missed = flow - law.predictions[law.newest < LAW_LEAD ? law.newest + 1u : 0u];
     if (law_reference != law.learned) {
         law.learned = law_reference;
@@ -199,7 +199,7 @@ struct law_decision law_step(real reading, const real *channels)
         }
     }
     seen = observe(&law.model, law.on != 0 ? ONE : ZERO, channels, 0);
-    /* Not a number, or beyond all bounds: no reading. */
+    /* NaN, or far out of range: counts as missing. */
     has_reading = reading < REAL_MAX && reading > -REAL_MAX;
     decision.residual = has_reading != 0 ? limited(reading - seen.measured, LAW_RESIDUAL_LIMIT) : ZERO;
     correct(seen.flow, has_reading, decision.residual, look.at_lead);

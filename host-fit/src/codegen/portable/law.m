@@ -12,7 +12,7 @@ function law = law_at_rest()
   law.air = c.LAW_AIR_CAPACITY;
 end
 
-% The flow half a hold time after `on` arrives, and LAW_LEAD samples from now.
+% Predicts the flow half a hold time after `on` arrives, and LAW_LEAD samples from now.
 function [foreseen, at_lead] = look_ahead(law, c, on, channels)
   if on
     hold = c.LAW_HOLD_ON; valve = c.LAW_OPENING;
@@ -52,7 +52,7 @@ function [foreseen, at_lead] = look_ahead(law, c, on, channels)
   end
 end
 
-% What the budgets of switches and air make of a wish.
+% The wanted position, limited by the budgets of switches and air.
 function yes = allowed(law, c, wanted)
   yes = wanted;
   if wanted && ~law.on

@@ -1,7 +1,7 @@
 
 
 class Law:
-    """Holds the flow at LAW_REFERENCE with an on/off valve: `step` takes a reading and says where the valve stands."""
+    """Holds the flow at LAW_REFERENCE with an on/off valve: `step` takes a reading and returns the valve's position."""
 
     def __init__(self):
         self.model = Model()
@@ -16,7 +16,7 @@ class Law:
         self.estimate = self.foreseen = self.residual = 0.0
 
     def _look_ahead(self, on, channels):
-        """The flow half a hold time after `on` arrives, and LAW_LEAD samples from now."""
+        """Predicts the flow half a hold time after `on` arrives, and LAW_LEAD samples from now."""
         hold = LAW_HOLD_ON if on else LAW_HOLD_OFF
         valve = LAW_OPENING if on else LAW_CLOSING
         near, far = valve + hold // 2, valve + (hold + 1) // 2
@@ -44,7 +44,7 @@ class Law:
         return foreseen, at_lead
 
     def _allowed(self, wanted):
-        """What the budgets of switches and air make of a wish."""
+        """The wanted position, limited by the budgets of switches and air."""
         if wanted and not self.on:
             switches = LAW_SAMPLES_PER_SWITCH == 0 or self.switches >= 2 * LAW_SAMPLES_PER_SWITCH
             return switches and (LAW_AIR_CAPACITY == 0 or self.air >= min(LAW_AIR_FIRST, LAW_AIR_CAPACITY))
@@ -76,7 +76,7 @@ class Law:
             self.share -= LAW_INTEGRAL_RATE * (self.share * self.share - LAW_SETTLED * LAW_SETTLED)
 
     def step(self, reading, channels=USUAL):
-        """Where the valve stands until the next sample; a reading that is None or no number is none."""
+        """The valve's position until the next sample; a reading of None or NaN counts as missing."""
         if LAW_SLOPE > 0.0:
             self.reference = max(min(LAW_REFERENCE, self.reference + LAW_SLOPE), self.reference - LAW_SLOPE)
         else:

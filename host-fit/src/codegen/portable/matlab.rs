@@ -81,19 +81,19 @@ impl Tongue for Matlab {
 
 pub(super) fn write(sheet: &Sheet<'_>, name: &str) -> String {
     let mut text = format!(
-        "% An identified model.\n%   y = {name}(u) is a free run over the commands u, from rest.\n\
-         %   [y, s] = {name}(u, s, channels) goes on from the state s, [] for rest; channels has a column for each of them.\n\
-         %   s = {name}('hold', u, y) is the state after command and reading were u and y for long.\n"
+        "% An identified model.\n%   y = {name}(u) is a free run for the commands u, starting at rest.\n\
+         %   [y, s] = {name}(u, s, channels) continues from the state s ([] for rest); channels has one column per channel.\n\
+         %   s = {name}('hold', u, y) is the state after a long time with constant command u and reading y.\n"
     );
     if sheet.law().is_some() {
         let _ = writeln!(
             text,
-            "%   [on, law] = {name}('law', reading, law) says where the valve stands until the next sample; law is [] at first."
+            "%   [on, law] = {name}('law', reading, law) returns the valve's position until the next sample; law is [] at the first call."
         );
     }
     text.push_str("%\n");
     for line in &sheet.header {
-        // A space: `%{` would begin a block.
+        // With a space, because `%{` would begin a block comment.
         let _ = writeln!(text, "% {line}");
     }
     main(sheet, name, &mut text);
@@ -108,7 +108,7 @@ pub(super) fn write(sheet: &Sheet<'_>, name: &str) -> String {
         ),
         (
             "ago(",
-            "\n% The past `samples` samples ago, straight from one sample to the next.\nfunction x = ago(line, samples)\n  samples = max(samples, 0);\n  whole = floor(samples);\n  x = line(1 + whole) + (samples - whole) * (line(2 + whole) - line(1 + whole));\nend\n",
+            "\n% The value `samples` samples ago, with linear interpolation.\nfunction x = ago(line, samples)\n  samples = max(samples, 0);\n  whole = floor(samples);\n  x = line(1 + whole) + (samples - whole) * (line(2 + whole) - line(1 + whole));\nend\n",
         ),
     ];
     for (call, helper) in helpers {
@@ -156,7 +156,7 @@ fn main(sheet: &Sheet<'_>, name: &str, w: &mut String) {
         .collect();
     let _ = write!(
         w,
-        "function [y, s] = {name}(u, s, channels, more)\n  usual = {}; % of the channels, in this order: {}\n  if nargin < 2, s = []; end\n  \
+        "function [y, s] = {name}(u, s, channels, more)\n  usual = {}; % usual values of the channels, in this order: {}\n  if nargin < 2, s = []; end\n  \
          if nargin < 3, channels = []; end\n  if ischar(u) && strcmp(u, 'hold')\n    if nargin < 4, more = usual; end\n    \
          y = hold(s, channels, more);\n    s = y;\n    return\n  end\n",
         usual,
@@ -182,7 +182,7 @@ fn main(sheet: &Sheet<'_>, name: &str, w: &mut String) {
 fn at_rest(sheet: &Sheet<'_>, w: &mut String) {
     let _ = write!(
         w,
-        "\n% Everything was 0 before the first sample; the newest is the first of each memory.\nfunction s = at_rest()\n  \
+        "\n% All signals are 0 before the first sample; element 1 of each memory is the newest.\nfunction s = at_rest()\n  \
          s.y = zeros({}, 1);\n  s.jets = zeros({}, 1);\n",
         sheet.memory.outputs, sheet.memory.jets
     );
@@ -224,7 +224,7 @@ fn observe(sheet: &Sheet<'_>, w: &mut String) {
     let model = sheet.model;
     let _ = write!(
         w,
-        "\n% What happens at a sample; the flow does not move on.\n\
+        "\n% Computes one sample without advancing the flow.\n\
          function [reading, now, following, nearest, s] = observe(s, u, channels, sensed)\n  PERIOD = {:?}; % s\n",
         model.sample_period_s
     );
@@ -253,7 +253,7 @@ fn observe(sheet: &Sheet<'_>, w: &mut String) {
     }
     w.push_str("  jet = u;\n");
     if let Some(command) = sheet.transport.as_ref().and_then(|t| t.command.as_ref()) {
-        w.push_str("  % edges held back\n");
+        w.push_str("  % delayed edges\n");
         piece(w, command, "  ", "jet", "jet = ");
     }
     for own in sheet.at(Place::Jet) {
@@ -353,7 +353,7 @@ fn flow(sheet: &Sheet<'_>, w: &mut String) {
     if sheet.graded() || sheet.drives {
         let _ = writeln!(
             w,
-            "  RATE_OFF = {:?}; RATE_ON = {:?}; % of the separated and the attached flow, 1/sample\n  share = {};",
+            "  RATE_OFF = {:?}; RATE_ON = {:?}; % relaxation rates of the separated and the attached flow, 1/sample\n  share = {};",
             sheet.pace.0,
             sheet.pace.1,
             share(model.grading)
@@ -371,7 +371,7 @@ fn flow(sheet: &Sheet<'_>, w: &mut String) {
         };
         let _ = write!(
             w,
-            "  % The flow goes at a rate between those of separated and attached flow to a level in proportion.\n  \
+            "  % Rate and final level of the flow lie between those of separated and attached flow.\n  \
              free = {:?} + {};\n  past = {};\n  following = free + past;\n  if arrived ~= 0\n    gain = {};\n    past_gain = {};\n    \
              separated = 0;\n    if past ~= 0, separated = (1 - arrived) * past / RATE_OFF; end\n    \
              attached = arrived * ({:?} + past + past_gain) / RATE_ON;\n    \
@@ -402,7 +402,7 @@ fn flow(sheet: &Sheet<'_>, w: &mut String) {
     if !sheet.drives {
         return;
     }
-    w.push_str("  % Effects of the flow: each sees the motion with those before it.\n  relaxation = RATE_OFF + (RATE_ON - RATE_OFF) * share;\n  separated = 1 - share;\n  if share ~= 0 && share ~= 1 && relaxation ~= 0\n    separated = (1 - share) * RATE_OFF / relaxation;\n  end\n  motion = separated * (following - now);\n");
+    w.push_str("  % Effects of the flow: each uses the motion with the preceding effects.\n  relaxation = RATE_OFF + (RATE_ON - RATE_OFF) * share;\n  separated = 1 - share;\n  if share ~= 0 && share ~= 1 && relaxation ~= 0\n    separated = (1 - share) * RATE_OFF / relaxation;\n  end\n  motion = separated * (following - now);\n");
     if model.grading == Grading::Proportional {
         w.push_str("  if arrived ~= 0 && arrived ~= 1\n    motion = (1 - arrived) * (free - now);\n  end\n");
     }
@@ -415,12 +415,12 @@ fn flow(sheet: &Sheet<'_>, w: &mut String) {
 }
 
 fn advance(sheet: &Sheet<'_>, w: &mut String) {
-    w.push_str("\n% Makes `flow` the newest one.\nfunction s = advance(s, flow)\n");
+    w.push_str("\n% Stores `flow` as the newest flow state.\nfunction s = advance(s, flow)\n");
     if sheet.follows && !sheet.model.averaging.averaged_model {
         let window = sheet.model.averaging.window;
         let _ = write!(
             w,
-            "  % The sum of every block is formed afresh: it does not drift.\n  s.fresh = s.fresh + s.y(1);\n  s.in_block = s.in_block + 1;\n  \
+            "  % The sum of every block is computed anew, so it does not drift.\n  s.fresh = s.fresh + s.y(1);\n  s.in_block = s.in_block + 1;\n  \
              if s.in_block >= {}\n    s.sum = s.fresh; s.fresh = 0; s.in_block = 0;\n  else\n    s.sum = s.sum + (s.y(1) - s.y({window}));\n  end\n",
             window - 1
         );

@@ -1,7 +1,8 @@
 //! A model and its law in other languages than Rust: one readable file each.
 //!
-//! The recursion, delays and the law are written for each language; effects and delay laws come from one description
-//! ([`forms.toml`](../../user_effect/forms.toml) and the user's own effects), which a printer per language writes out.
+//! The recursion, the delays and the law are written for each language. Effects and delay laws come from one
+//! description ([`forms.toml`](../../user_effect/forms.toml) and the user's own effects), which each language's
+//! printer writes out.
 
 mod c;
 mod matlab;
@@ -24,7 +25,8 @@ pub enum Precision {
     Double,
 }
 
-/// The model and its law as C99: `model_step`, `law_step`, static state, no heap; the host's bits in its precision.
+/// The model and its law as C99: `model_step`, `law_step`, static state, no heap; bit-identical to the host in its
+/// precision.
 ///
 /// # Errors
 /// A number beyond single precision, or an effect without a form.
@@ -45,8 +47,8 @@ pub fn python(model: &Model) -> Result<String, CodegenError> {
     Ok(python::write(&Sheet::new::<f64>(model)?))
 }
 
-/// The model and its law as a function file for MATLAB and GNU Octave. The function is called as the file is: letters,
-/// digits and `_` of `name`, after `model_` where that begins with no letter.
+/// The model and its law as a function file for MATLAB and GNU Octave. The function has the name of the file:
+/// letters, digits and `_` of `name`, after `model_` if the name does not begin with a letter.
 ///
 /// # Errors
 /// As [`c`].
@@ -63,7 +65,7 @@ pub fn matlab(model: &Model, name: &str) -> Result<String, CodegenError> {
 pub fn function_name(name: &str) -> String {
     let clean = |c: char| if c.is_ascii_alphanumeric() { c } else { '_' };
     let name: String = name.chars().map(clean).take(40).collect();
-    // Begins with a letter, and is no word of the language.
+    // Begins with a letter, and is not a keyword of the language.
     const TAKEN: [&str; 6] = ["end", "for", "function", "if", "law", "while"];
     if name.starts_with(|c: char| c.is_ascii_alphabetic()) && !TAKEN.contains(&name.as_str()) {
         name

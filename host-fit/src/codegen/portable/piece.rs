@@ -1,11 +1,11 @@
-//! An effect or a delay law as statements, for any language that has numbers and names.
+//! An effect or a delay law as statements in any language with numbers and names.
 
 use crate::user_effect::UserEffect;
 use crate::user_effect::program::{Binary, Op, Program, Register, Signal, Unary};
 use model_core::Real;
 use model_core::effect::{Place, Setting};
 
-/// How tightly an operator binds; an operand that binds less is put in parentheses.
+/// Precedence of an operator; an operand of lower precedence is put in parentheses.
 const ATOM: u8 = 10;
 const SIGN: u8 = 8;
 const PRODUCT: u8 = 6;
@@ -13,7 +13,7 @@ const SUM: u8 = 5;
 const COMPARISON: u8 = 4;
 const LOOSEST: u8 = 0;
 
-/// An expression and how tightly it binds.
+/// An expression with its precedence.
 #[derive(Clone, Debug)]
 pub(super) struct Text(pub(super) String, u8);
 
@@ -43,17 +43,17 @@ pub(super) trait Tongue {
     fn select(&self, condition: &str, then: &str, otherwise: &str) -> String;
     /// and, or, not, unequal.
     fn logic(&self) -> [&'static str; 4];
-    /// A signal; `channel` numbers the piece's own.
+    /// A signal; `channel` is the number of the piece's own channel.
     fn signal(&self, signal: Signal, channel: usize) -> String;
     /// A variable of the model's state.
     fn state(&self, name: &str) -> String;
     /// A statement that names a result.
     fn local(&self, name: &str, value: &str) -> String;
-    /// A statement that gives a state another value.
+    /// A statement that assigns a value to a state.
     fn assign(&self, state: &str, value: &str) -> String;
-    /// A statement that makes `value` the newest sample of a memory.
+    /// A statement that stores `value` as the newest sample of a memory.
     fn push(&self, line: &str, value: &str) -> String;
-    /// The sample of a memory so many samples back, between that and the one before it.
+    /// The value of a memory this many samples back, interpolated between that sample and the preceding one.
     fn read(&self, line: &str, samples: Tapped<'_>) -> String;
 }
 
@@ -82,19 +82,19 @@ pub(super) enum Function {
 /// An effect or a delay law with its names.
 pub(super) struct Piece {
     pub(super) program: &'static Program,
-    /// Before the names of constants, `FX1`; states have it in small letters.
+    /// Prefix of the names of constants, for example `FX1`; states have it in lower case.
     prefix: String,
     /// Before the names of parameters.
     owner: String,
     parameters: Vec<String>,
     channel: usize,
-    /// Results that do not change, evaluated as the host does.
+    /// Constant results, evaluated as on the host.
     values: Vec<f64>,
     taps: Vec<(usize, f64)>,
     lengths: Vec<usize>,
     /// How often a result is used.
     uses: Vec<usize>,
-    /// Results that do not change and have a name, numbered.
+    /// Constant results that have a name, numbered.
     constants: Vec<Register>,
 }
 
@@ -118,7 +118,7 @@ pub(super) struct Made<'a> {
 }
 
 impl Piece {
-    /// Evaluates what does not change in numbers of type `T`.
+    /// Evaluates the constant results in numbers of type `T`.
     pub(super) fn new<T: Real>(program: &'static Program, made: &Made<'_>) -> Self {
         let parameters: Vec<T> = made.values.iter().map(|v| T::from_f64(*v)).collect();
         let setting = Setting {
@@ -126,7 +126,7 @@ impl Piece {
             channel: made.channel,
             reference: T::from_f64(made.reference),
         };
-        // The place says only which hook would run it.
+        // The place determines only which hook would run it.
         let host = UserEffect::of(program, Place::Jet, &parameters, &setting);
         let values = (0..program.ops.len()).map(|r| host.constant(r).value());
         let taps = (0..program.lines).map(|line| {
@@ -153,10 +153,10 @@ impl Piece {
         self.program.once.get(register).copied().unwrap_or(false)
     }
 
-    /// What an operation reads where it is computed.
+    /// Operands of an operation at its place of use.
     fn operands(op: &Op) -> Vec<Register> {
         match op {
-            // A delay that does not change is a place in the memory.
+            // A constant delay is a fixed position in the memory.
             Op::Delayed {
                 signal,
                 longest: None,
@@ -185,7 +185,7 @@ impl Piece {
             self.uses[register] += 1;
             varying[register] = true;
         }
-        // From the last to the first: a constant is needed if one that is needed is made of it.
+        // From the last to the first: a constant is needed if a needed constant depends on it.
         let plain = |op: &Op| {
             matches!(
                 op,
@@ -223,7 +223,7 @@ impl Piece {
         format!("{}v{register}", self.prefix.to_lowercase())
     }
 
-    /// What stands before the names of its parameters.
+    /// Prefix of the names of its parameters.
     pub(super) fn owner(&self) -> &str {
         &self.owner
     }
@@ -249,7 +249,7 @@ impl Piece {
         self.program.reads(Op::Reference) || self.reads(Signal::Channel)
     }
 
-    /// What it needs that does not change.
+    /// The constants that it needs.
     pub(super) fn constants(&self, tongue: &impl Tongue) -> Vec<Constant> {
         let each = self.constants.iter().filter_map(|register| {
             Some(Constant {
@@ -336,7 +336,7 @@ impl Piece {
                 Binary::GreaterOrEqual => infix(x, ">=", y, COMPARISON),
                 Binary::Equal => infix(x, "==", y, COMPARISON),
                 Binary::Unequal => infix(x, unequal, y, COMPARISON),
-                // In parentheses: languages differ in which of them binds more.
+                // In parentheses, because languages differ in their precedence.
                 Binary::And => Text::atom(format!("(({}) {and} ({}))", of(x).0, of(y).0)),
                 Binary::Or => Text::atom(format!("(({}) {or} ({}))", of(x).0, of(y).0)),
             },
@@ -368,7 +368,7 @@ impl Piece {
         }
     }
 
-    /// The statements of a sample, and the value.
+    /// The statements of a sample, and the resulting value.
     pub(super) fn statements(&self, tongue: &impl Tongue) -> (Vec<String>, String) {
         let program = self.program;
         let mut lines = Vec::new();
@@ -390,7 +390,7 @@ impl Piece {
         if program.states.is_empty() {
             return (lines, value);
         }
-        // States change all at once: what is read of them is named before.
+        // All states change at once, so values that are read are copied before.
         let kept = |register: Register| {
             self.once(register) || self.text(register, tongue).0 == self.local(register)
         };

@@ -1,17 +1,18 @@
-//! Text of a model file that is written into a comment or a string of another language: it must not end either.
+//! Text of a model file that is written into a comment or a string of another language. It must not end either of
+//! them.
 
 /// Longest text in a comment, characters.
 const LONGEST: usize = 160;
 
-/// `text` for a comment of one line in any of the languages: no control characters, no marks that turn the direction
-/// of what is read, no signs that end a comment of C.
+/// `text` for a comment of one line in any of the languages: without control characters, marks that change the
+/// direction of the text, or signs that end a comment of C.
 pub(super) fn comment(text: &str) -> String {
     let turns = |c: char| matches!(c, '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}' | '\u{feff}');
     let clean = text
         .chars()
         .map(|c| if c.is_control() || turns(c) { ' ' } else { c });
     let clean: String = clean.take(LONGEST).collect();
-    // A line of C that ends in a backslash goes on; `??/` is one in old C.
+    // A line of C that ends in a backslash continues on the next line; `??/` is a backslash in old C.
     clean
         .replace('\\', "/")
         .replace("??", "? ?")
@@ -19,12 +20,12 @@ pub(super) fn comment(text: &str) -> String {
         .replace("/*", "/ *")
 }
 
-/// `text` as a string of C: printable ASCII as it is, bytes otherwise.
+/// `text` as a string of C: printable ASCII unchanged, other characters as bytes.
 pub(super) fn c_string(text: &str) -> String {
     let byte = |b: u8| match b {
         b'"' | b'\\' | b'?' => format!("\\{}", char::from(b)),
         b' '..=b'~' => char::from(b).to_string(),
-        // Three digits: what follows cannot belong to them.
+        // Three digits, so that a following digit cannot belong to the escape.
         _ => format!("\\{b:03o}"),
     };
     format!("\"{}\"", text.bytes().map(byte).collect::<String>())
@@ -60,7 +61,7 @@ mod tests {
         let text = comment(hostile);
         assert!(!text.contains("*/") && !text.contains("/*"), "{text}");
         assert!(!text.contains(char::is_control) && !text.contains(['\\', '\u{2028}']));
-        // Replacing must not make what it removes.
+        // The replacement must not create a sequence that it removes.
         assert!(
             !comment("*//*/ /*/").contains("*/"),
             "{}",

@@ -34,7 +34,7 @@ int law_step(void)
     } else if (law.since < UINT32_MAX) {
         law.since += 1u;
     } else {
-        /* long ago */
+        /* a long time ago */
     }
     return law.on;
 }

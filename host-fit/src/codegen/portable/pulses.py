@@ -1,7 +1,7 @@
 
 
 class Law:
-    """Plays pulses in a period that repeats: `step` says where the valve stands until the next sample."""
+    """Plays pulses in a period that repeats: `step` returns the valve's position until the next sample."""
 
     def __init__(self):
         self.at = 0

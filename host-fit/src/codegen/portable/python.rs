@@ -91,7 +91,7 @@ pub(super) fn write(sheet: &Sheet<'_>) -> String {
     let helpers = core.filter(|(name, _)| body.contains(&format!("{name}(")));
     let helpers: String = helpers.map(|(_, text)| text).collect();
     let mut head = String::from(
-        "\"\"\"An identified model: `Model().simulate(u)` is a free run, `step` one sample of it.\"\"\"\n\n",
+        "\"\"\"An identified model: `Model().simulate(u)` computes a free run, `step` one sample.\"\"\"\n\n",
     );
     for line in &sheet.header {
         let _ = writeln!(head, "# {line}");
@@ -121,7 +121,7 @@ fn constants(sheet: &Sheet<'_>) -> String {
     let _ = writeln!(w, "PERIOD = {:?}  # s", model.sample_period_s);
     let _ = writeln!(
         w,
-        "COMMAND_OFF, COMMAND_FULL = {:?}, {:?}  # the commands of no jet and of a full one",
+        "COMMAND_OFF, COMMAND_FULL = {:?}, {:?}  # commands of no jet and of a full jet",
         model.command.off, model.command.full
     );
     let _ = writeln!(
@@ -132,24 +132,24 @@ fn constants(sheet: &Sheet<'_>) -> String {
     let _ = writeln!(w, "USUAL = {}  # their usual values", tuple(&usual));
     let _ = writeln!(
         w,
-        "OUTPUTS, JETS = {}, {}  # flows and jets kept, samples",
+        "OUTPUTS, JETS = {}, {}  # stored flow states and jet strengths, samples",
         sheet.memory.outputs, sheet.memory.jets
     );
     let _ = writeln!(
         w,
-        "WINDOW = {}  # of averages, samples",
+        "WINDOW = {}  # length of averages, samples",
         model.averaging.window
     );
     let _ = writeln!(
         w,
-        "HELD = {}  # samples lived through before a run that does not begin at rest",
+        "HELD = {}  # samples simulated before a run that does not begin at rest",
         sheet.held
     );
     let _ = writeln!(w, "SENSOR_ZERO = {:?}  # y", sheet.zero);
     if sheet.graded() || sheet.drives {
         let _ = writeln!(
             w,
-            "RATE_OFF, RATE_ON = {:?}, {:?}  # of the separated and the attached flow, 1/sample",
+            "RATE_OFF, RATE_ON = {:?}, {:?}  # relaxation rates of the separated and the attached flow, 1/sample",
             sheet.pace.0, sheet.pace.1
         );
     }
@@ -206,7 +206,7 @@ fn constants(sheet: &Sheet<'_>) -> String {
     text
 }
 
-/// A sum over the past, `start` first.
+/// A sum over the past, starting with `start`.
 fn sum(start: &str, coefficients: &[f64], back: &[usize]) -> String {
     let mut text = start.to_owned();
     for (i, (coefficient, lag)) in coefficients.iter().zip(back).enumerate() {
@@ -240,9 +240,9 @@ fn class(sheet: &Sheet<'_>) -> String {
     let model = sheet.model;
     let average = sheet.follows && !model.averaging.averaged_model;
     let mut text = String::from(
-        "\nclass Model:\n    \"\"\"The model with what it remembers.\"\"\"\n\n    def __init__(self):\n        self.reset()\n\n    \
+        "\nclass Model:\n    \"\"\"The model with its state.\"\"\"\n\n    def __init__(self):\n        self.reset()\n\n    \
          def reset(self, y=None, u=None, channels=USUAL):\n        \
-         \"\"\"Back to the first sample. Before it everything was 0; or the reading was `y` and the command `u` for long.\"\"\"\n        \
+         \"\"\"Restarts at the first sample. Before it all signals are 0, or the reading `y` and the command `u` are constant.\"\"\"\n        \
          self.y = [0.0] * OUTPUTS\n        self.jets = [0.0] * JETS\n",
     );
     let w = &mut text;
@@ -251,7 +251,7 @@ fn class(sheet: &Sheet<'_>) -> String {
     }
     let averaged = model.averaging.averaged_model;
     if averaged {
-        w.push_str("        self.sums = [0.0] * (JETS + 1)  # of the jets so far\n");
+        w.push_str("        self.sums = [0.0] * (JETS + 1)  # sums of the jets so far\n");
     }
     if sheet.clocked {
         w.push_str("        self.lived, self.since_edge, self.last_command = 0, 1 << 24, 0.0\n");
@@ -279,7 +279,7 @@ fn class(sheet: &Sheet<'_>) -> String {
          self.advance(y - SENSOR_ZERO)\n                self.observe({share}, channels, True)\n            self.advance(y - SENSOR_ZERO)\n\n    \
          def copy(self):\n        return copy.deepcopy(self)\n\n    \
          def observe(self, u, channels, sensed):\n        \
-         \"\"\"What happens at a sample: (reading, flow, next flow, shortest delay). The flow does not move on.\"\"\"\n        \
+         \"\"\"Computes one sample without advancing the flow: (reading, flow, next flow, shortest delay).\"\"\"\n        \
          y, jets = self.y, self.jets\n        now = y[-1]\n"
     );
     if sheet.clocked {
@@ -288,7 +288,7 @@ fn class(sheet: &Sheet<'_>) -> String {
     w.push_str("        jet = u\n");
     let indent = "        ";
     if let Some(command) = sheet.transport.as_ref().and_then(|t| t.command.as_ref()) {
-        w.push_str("        # edges held back\n");
+        w.push_str("        # delayed edges\n");
         piece(w, command, indent, "jet", "jet = ");
     }
     for own in sheet.at(Place::Jet) {
@@ -307,9 +307,9 @@ fn class(sheet: &Sheet<'_>) -> String {
         }
     }
     flow(sheet, w);
-    w.push_str("        return reading, now, following, nearest\n\n    def advance(self, flow):\n        \"\"\"Makes `flow` the newest one.\"\"\"\n        y = self.y\n");
+    w.push_str("        return reading, now, following, nearest\n\n    def advance(self, flow):\n        \"\"\"Stores `flow` as the newest flow state.\"\"\"\n        y = self.y\n");
     if average {
-        w.push_str("        # The sum of every block is formed afresh: it does not drift.\n        self.fresh += y[-1]\n        self.in_block += 1\n        \
+        w.push_str("        # The sum of every block is computed anew, so it does not drift.\n        self.fresh += y[-1]\n        self.in_block += 1\n        \
                     if self.in_block >= WINDOW - 1:\n            self.sum, self.fresh, self.in_block = self.fresh, 0.0, 0\n        \
                     else:\n            self.sum += y[-1] - y[-WINDOW]\n");
     }
@@ -323,12 +323,12 @@ fn class(sheet: &Sheet<'_>) -> String {
         w,
         "        y.append(flow)\n        if len(y) > 65536 + OUTPUTS:\n            del y[:-OUTPUTS]\n            del self.jets[:-JETS]\n{shorter}\n    \
          def step(self, command, channels=USUAL):\n        \
-         \"\"\"The reading at this sample, under the command from now to the next one; the model moves on.\"\"\"\n        \
+         \"\"\"Returns the reading at this sample and advances the model; the command holds until the next sample.\"\"\"\n        \
          reading, _, following, _ = self.observe({share}, channels, True)\n        self.advance(following)\n        return reading\n\n    \
          def simulate(self, u, channels=None, y_before=None, u_before=None):\n        \
-         \"\"\"A free run over the commands `u`: the readings, as many.\n\n        \
-         `channels` has a column for each of CHANNELS, in its unit. Before the first sample everything was 0; or the\n        \
-         reading was `y_before` and the command `u_before` (the first one if not given) for long.\n        \"\"\"\n        \
+         \"\"\"A free run for the commands `u`; returns one reading per command.\n\n        \
+         `channels` has a column for each of CHANNELS, in its unit. Before the first sample all signals are 0, or the\n        \
+         reading `y_before` and the command `u_before` (by default the first one) are constant.\n        \"\"\"\n        \
          u = np.asarray(u, dtype=float).ravel()\n        \
          rows = [USUAL] * len(u) if channels is None else np.asarray(channels, dtype=float).reshape(len(u), -1).tolist()\n        \
          first = u[0] if u_before is None and len(u) else u_before\n        \
@@ -372,7 +372,7 @@ fn arriving(sheet: &Sheet<'_>, w: &mut String) {
     let signal = if model.averaging.averaged_model {
         "max(now, 0.0)"
     } else {
-        "max(self.sum / WINDOW, 0.0)  # the mean of the flows before this one, eq. (1)"
+        "max(self.sum / WINDOW, 0.0)  # the mean of the preceding flow states, eq. (1)"
     };
     piece(w, &transport.effect.piece, "        ", signal, "delay = ");
     w.push_str("        nearest = JETS\n");
@@ -429,7 +429,7 @@ fn flow(sheet: &Sheet<'_>, w: &mut String) {
         };
         let _ = write!(
             w,
-            "        # The flow goes at a rate between those of separated and attached flow to a level in proportion.\n        \
+            "        # Rate and final level of the flow lie between those of separated and attached flow.\n        \
              free = {constant} + (\n            {})\n        past = (\n            {})\n        following = free + past\n        \
              if arrived != 0.0:\n            share = {}\n            gain = (\n            {})\n            past_gain = (\n            {})\n            \
              separated = (1.0 - arrived) * past / RATE_OFF if past != 0.0 else 0.0\n            \
@@ -467,7 +467,7 @@ fn flow(sheet: &Sheet<'_>, w: &mut String) {
     };
     let _ = write!(
         w,
-        "        # Effects of the flow: each sees the motion with those before it.\n        share = {}\n        \
+        "        # Effects of the flow: each uses the motion with the preceding effects.\n        share = {}\n        \
          relaxation = RATE_OFF + (RATE_ON - RATE_OFF) * share\n        \
          separated = 1.0 - share if share in (0.0, 1.0) or relaxation == 0.0 else (1.0 - share) * RATE_OFF / relaxation\n        \
          motion = {part}\n        added = 0.0\n",

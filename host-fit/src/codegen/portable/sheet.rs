@@ -26,7 +26,7 @@ pub(super) struct Effect {
 /// A delay that follows a law.
 pub(super) struct Transport {
     pub(super) effect: Effect,
-    /// What becomes of the command, where the law holds edges back.
+    /// The conversion of the command by a law that delays edges separately.
     pub(super) command: Option<Piece>,
     pub(super) factors: Vec<f64>,
     pub(super) rounded: bool,
@@ -43,14 +43,14 @@ pub(super) struct Sheet<'a> {
     pub(super) rows: Vec<Vec<f64>>,
     pub(super) effects: Vec<Effect>,
     pub(super) transport: Option<Transport>,
-    /// Whether the delay follows the averaged output.
+    /// Whether the delay depends on the averaged output.
     pub(super) follows: bool,
     pub(super) drives: bool,
     pub(super) clocked: bool,
-    /// The rates of the separated and the attached flow, per sample, and the lag below which terms are of the flow's
-    /// order; none for all.
+    /// The rates of the separated and the attached flow, per sample, and the lag below which terms count for these
+    /// rates; none for all terms.
     pub(super) pace: (f64, f64, Option<usize>),
-    /// Samples lived through before a run that does not begin at rest.
+    /// Samples that are simulated before a run that does not begin at rest.
     pub(super) held: usize,
     /// What the sensor shows at rest.
     pub(super) zero: f64,
@@ -157,7 +157,7 @@ impl<'a> Sheet<'a> {
             model,
             header: crate::codegen::header_lines(model)
                 .iter()
-                // Not constants, but a model: every language says so above.
+                // The header mentions a model instead of constants in every language.
                 .skip(2)
                 .map(|l| comment(l))
                 .collect(),
@@ -183,12 +183,12 @@ impl<'a> Sheet<'a> {
             .filter(move |effect| effect.place == place)
     }
 
-    /// Whether the flow goes to a level of its own under jets of part strength.
+    /// Whether the flow approaches a separate level under jets of part strength.
     pub(super) fn graded(&self) -> bool {
         self.model.grading != Grading::Proportional && self.model.b.len() == 1
     }
 
-    /// The delay law, what it does with the command, and the effects: everything that has names.
+    /// The delay law, its effect on the command, and the effects: all items that have names.
     pub(super) fn pieces(&self) -> impl Iterator<Item = &Piece> {
         let law = self.transport.iter();
         let law = law.flat_map(|t| t.command.iter().chain([&t.effect.piece]));

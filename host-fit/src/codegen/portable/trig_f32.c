@@ -1,4 +1,4 @@
-/* Sine and cosine, the host's (FreeBSD's k_sinf.c, k_cosf.c, e_rem_pio2f.c).
+/* Sine and cosine as on the host (FreeBSD's k_sinf.c, k_cosf.c, e_rem_pio2f.c).
  * Copyright (C) 1993 by Sun Microsystems, Inc. All rights reserved. Developed at SunPro, a Sun Microsystems, Inc. business.
  * Permission to use, copy, modify, and distribute this software is freely granted, provided that this notice is preserved. */
 static float kernel_sine(double x)
@@ -15,7 +15,7 @@ static float kernel_cosine(double x)
     return (float)(((1.0 + z * -0.499999997251031003120) + w * 0.0416666233237390631894) + (w * z) * r);
 }
 
-/* `turns` quarter turns further than the sine of x. */
+/* The sine of x plus `turns` quarter turns. */
 static real sine_of(real x, uint32_t turns)
 {
     const double half_pi = 1.57079632679489661923;
@@ -26,7 +26,7 @@ static real sine_of(real x, uint32_t turns)
     word.number = x;
     bits = word.bits & 0x7fffffffu;
     if (bits >= 0x4dc90fdbu) {
-        /* Beyond 2^28 quarter turns, or no number. */
+        /* Beyond 2^28 quarter turns, or NaN. */
         return turns == 0u ? (float)sin(wide) : (float)cos(wide);
     }
     if (bits > 0x40e231d5u) {

@@ -1,4 +1,4 @@
-/* Sine and cosine, the host's (FreeBSD's k_sin.c, k_cos.c, e_rem_pio2.c).
+/* Sine and cosine as on the host (FreeBSD's k_sin.c, k_cos.c, e_rem_pio2.c).
  * Copyright (C) 1993 by Sun Microsystems, Inc. All rights reserved. Developed at SunPro, a Sun Microsystems, Inc. business.
  * Permission to use, copy, modify, and distribute this software is freely granted, provided that this notice is preserved. */
 static double kernel_sine(double x, double y, int reduced)
@@ -28,13 +28,13 @@ static uint32_t high_word(double x)
     return (uint32_t)(word.bits >> 32) & 0x7fffffffu;
 }
 
-/* `turns` quarter turns further than the sine of x. */
+/* The sine of x plus `turns` quarter turns. */
 static real sine_of(real x, uint32_t turns)
 {
     const uint32_t ix = high_word(x);
     double n = 0.0, y0 = x, y1 = 0.0;
     if (ix >= 0x413921fbu) {
-        /* Beyond 2^20 quarter turns, or no number: the library's. */
+        /* Beyond 2^20 quarter turns, or NaN: the library's function. */
         return turns == 0u ? sin(x) : cos(x);
     }
     if (ix > 0x3fe921fbu) {

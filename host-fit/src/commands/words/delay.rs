@@ -78,7 +78,7 @@ fn study_words(report: &DelayReport) -> String {
             let Spread { mean, sd, .. } = q.spread;
             let _ = writeln!(
                 text,
-                "law over all samples: mean {mean:.2}, sd {sd:.2} samples; correlation with u {}, with y {}",
+                "law evaluated at all samples: mean {mean:.2}, sd {sd:.2} samples; correlation with u {}, with y {}",
                 r(q.correlation_input),
                 r(q.correlation_output)
             );
@@ -135,7 +135,8 @@ fn dead_time_words(study: &DelayStudy, period: f64) -> String {
             study.method.words()
         ),
         _ => format!(
-            "from {}; one plant does not fit the records. The interval covers other choices of --reach ({} samples, {} s, here)",
+            "from {}; one plant does not fit the records. The interval includes the variation with --reach \
+                 (here {} samples, {} s)",
             study.method.words(),
             study.reach,
             brief(study.reach as f64 * period)
@@ -172,7 +173,7 @@ fn law_words(text: &mut String, study: &DelayStudy) {
             );
         }
         if !law.outliers.is_empty() {
-            let _ = writeln!(text, "  {} edge(s) far off set aside", law.outliers.len());
+            let _ = writeln!(text, "  {} outlying edge(s) excluded", law.outliers.len());
         }
     } else if let Some(reason) = &study.law_not_kept {
         let otherwise = match study.verdict {
@@ -198,7 +199,7 @@ fn mean_words(delays: &[(f64, f64)]) -> String {
     let mean = delays.iter().map(|d| d.0).sum::<f64>() / n;
     let scatter = delays.iter().map(|d| (d.0 - mean).powi(2)).sum::<f64>();
     let scatter = (scatter / (n - 1.0).max(1.0) / n).sqrt();
-    // The common part is contained in every single error.
+    // Every single error contains the common part.
     let shared = delays.iter().map(|d| d.1).fold(f64::INFINITY, f64::min);
     let error = scatter.max(shared).max(0.1);
     format!("{mean:.1} ± {error:.1} ({})", delays.len())

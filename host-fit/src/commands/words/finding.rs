@@ -72,8 +72,8 @@ fn ladder_table(ladder: &[Rung]) -> String {
     aligned(&head, &ladder_rows(ladder), 1)
 }
 
-/// `name value unit (low … high)`, or that it is not identifiable: its interval spans its whole range, or a
-/// factor of more than a hundred.
+/// `name value unit (low … high)`, or that it is not identifiable: its interval spans its whole range, or a factor
+/// of more than a hundred.
 fn estimate_words(effect: &str, name: &str, p: &ParameterEstimate) -> String {
     const FACTOR: f64 = 100.0;
     let unit = if p.unit == "-" { "" } else { p.unit.as_str() };

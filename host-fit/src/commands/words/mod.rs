@@ -1,4 +1,4 @@
-//! Results in words: what a command prints without `--json`.
+//! Results in words: the output of a command without `--json`.
 
 mod delay;
 mod design;
@@ -48,7 +48,7 @@ impl Words for ImportedSet {
             let taken = &file.mapping;
             let time = match &taken.t {
                 Some(t) => format!("t is `{t}`"),
-                None => "t is the row".to_owned(),
+                None => "t is the row number".to_owned(),
             };
             let mut text = format!(
                 "{}: {}; {} samples, {} s apart; {time}, u is `{}`, y is `{}`",
@@ -199,7 +199,7 @@ pub(crate) const SIDE_BY_SIDE: [&str; 7] = [
     "parameters",
 ];
 
-/// A row for each model; errors are those of the validation records where there are any.
+/// A row for each model; errors are those of the validation records if there are any.
 pub(crate) fn side_by_side_rows(found: &SideBySide) -> Vec<Vec<String>> {
     let none = || "–".to_owned();
     let row = |named: &NamedComparison| {
@@ -227,7 +227,8 @@ impl Words for Extension {
         let mut told = vec![self.answer.words(), String::new(), describe(&self.model)];
         if self.dropped_lags {
             told.push(
-                "With the effect, one lag of each kind fits equally well, so the model has fewer lags than the given one."
+                "With the effect, one lag of each kind fits equally well, so this model has fewer lags than \
+                     the given one."
                     .to_owned(),
             );
         }

@@ -1,4 +1,4 @@
-//! The state of the project as the page shows it, and the ways in which models enter it.
+//! The state of the project for the page, and the ways in which models enter it.
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -76,7 +76,7 @@ impl ModelBench {
         })
     }
 
-    /// Takes a model that the user has into the project, unless it exists already.
+    /// Copies a user's model into the project, unless it exists already.
     pub(super) fn bring(&self, path: &Path) -> anyhow::Result<()> {
         let model = Model::load(path)?;
         let known = {
@@ -94,8 +94,8 @@ impl ModelBench {
                 let made = Made {
                     model: &model,
                     from: None,
-                    step: "brought along".to_owned(),
-                    command: format!("# {} brought along", path.display()),
+                    step: "added by the user".to_owned(),
+                    command: format!("# model {} added by the user", path.display()),
                 };
                 self.keep(&made).map_err(|why| anyhow::anyhow!(why.0))?;
             }
@@ -333,7 +333,7 @@ impl Bench for ModelBench {
             Some(("inspect", file)) => self.uploads.inspect(file),
             Some(("best", seen)) => Ok(self.best_since(seen)),
             _ => Err(Refusal(
-                "one of `check`, `keep`, `forget`, `inspect` and `best` with a text is needed"
+                "the key must be one of `check`, `keep`, `forget`, `inspect` and `best`, with a text"
                     .to_owned(),
             )),
         }
@@ -392,7 +392,7 @@ impl Bench for ModelBench {
             ),
             "experiment" | "loop" => written(kind, format!("{kind}-{model}.csv"), "text/csv"),
             _ => Err(Refusal(
-                "files are model, constants, report, diagnosis, discovery, experiment and loop"
+                "a file must be one of model, constants, report, diagnosis, discovery, experiment and loop"
                     .to_owned(),
             )),
         }

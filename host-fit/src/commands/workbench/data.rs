@@ -13,7 +13,7 @@ use crate::commands::words::role_name;
 
 /// A data set with its excitation check.
 pub(super) struct Data {
-    /// The path as the user gave it, for commands.
+    /// The path as given by the user, for commands.
     pub(super) path: PathBuf,
     pub(super) set: DataSet,
     remarks: Vec<String>,

@@ -55,7 +55,7 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
                 &serde_json::json!({"address": address, "project": project.to_string_lossy()}),
             ),
             false => console.say(&format!(
-                "the workbench is at {address}\nproject folder {}; Ctrl-C ends it, nothing is lost",
+                "the workbench is at {address}\nproject folder {}; Ctrl-C ends it, all results are saved",
                 project.display()
             )),
         };

@@ -139,18 +139,21 @@ impl Request {
             .find(|name| !known.contains(&name.as_str()))
         {
             return Err(format!(
-                "`{}` takes no option `{other}` here",
+                "`{}` does not accept the option `{other}` here",
                 read.command.name()
             ));
         }
         match (read.command.needs_a_model(), read.model) {
             (true, None) => Err("`model` is missing: the number of a model".to_owned()),
-            (false, Some(_)) => Err(format!("`{}` starts from no model", read.command.name())),
+            (false, Some(_)) => Err(format!(
+                "`{}` does not start from a model",
+                read.command.name()
+            )),
             _ => Ok(read),
         }
     }
 
-    /// The options as words of the command line; what is empty is left out.
+    /// The options as words of the command line, without empty ones.
     pub(super) fn options(&self) -> Vec<String> {
         let mut words = Vec::new();
         for (name, given) in &self.options {
@@ -177,7 +180,7 @@ pub(super) struct Line {
 }
 
 impl Line {
-    /// `files` come first and are never taken for options.
+    /// `files` come first and are never parsed as options.
     pub(super) fn new(command: Command, files: &[PathBuf], rest: Vec<String>) -> Self {
         let file = |path: &PathBuf| match path.to_string_lossy() {
             text if text.starts_with('-') => format!("./{text}"),

@@ -82,7 +82,7 @@ impl Onlooker for Page<'_> {
         (glimpse.evaluations, glimpse.best) = (snapshot.evaluations, snapshot.best);
     }
     fn finds(&self, best: &dyn Fn() -> Option<Model>) {
-        /// Largest share of the search's time for showing models, as one part in so many.
+        /// Largest share of the search's time for showing models, as one part in this many.
         const SHARE: u32 = 50;
         let mut glimpse = lock(&self.glimpse);
         let started = Instant::now();
@@ -187,7 +187,7 @@ impl ModelBench {
     }
 }
 
-/// Path of the closed loop's CSV, beside the model with the law.
+/// Path of the closed loop's CSV, next to the model with the law.
 fn loop_of(model: &Path) -> PathBuf {
     let stem = model.file_stem().unwrap_or_default().to_string_lossy();
     model.with_file_name(format!("{}.csv", stem.replace("model", "loop")))

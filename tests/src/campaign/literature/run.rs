@@ -1,4 +1,4 @@
-//! Runs a case as a user would: a folder, `identify`, `diagnose`.
+//! Runs a case like a user: a folder, `identify`, `diagnose`.
 
 use std::fs;
 use std::path::Path;

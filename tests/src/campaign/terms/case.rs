@@ -58,9 +58,8 @@ pub(super) fn of_the_catalogue(name: &str) -> Vec<Truth> {
     spots.iter().map(truth).collect()
 }
 
-/// The cases of a campaign in an order that mixes them, so that the first of them are a sample of all. Every
-/// rig has a seed of its own, and with it a flow of its own. Half have noise that is white and coloured, the
-/// others any.
+/// The cases of a campaign in random order, so that any first part is a sample of all. Every rig has its own seed
+/// and flow. Half have white and coloured noise, the others any kind.
 #[must_use]
 pub fn cases(sizes: &Sizes, seed: u64) -> Vec<Case> {
     let mut all: Vec<Case> = Vec::new();

@@ -1,13 +1,13 @@
-//! Whether a curve shows the region in which the physics deviates.
+//! Whether a curve has the region in which the physics deviates.
 
 use firmware_sim::recording::Recorded;
 use host_fit::data::Record;
 
-/// F1 of the samples that `curve` puts into the broken regime, the truth being a `coordinate` above `above`; 0
-/// for a curve that puts none there.
+/// F1 score of the samples that `curve` assigns to the deviating region, if the truth is a `coordinate` above
+/// `above`; 0 for a curve that assigns none.
 ///
-/// The curve is cut in the middle between its highest and its lowest value on the samples; the side on which
-/// fewer of them lie is taken for the broken one, as what is rare is the exception.
+/// The curve is cut in the middle between its highest and its lowest value on the samples. The side with fewer
+/// samples counts as the deviating region.
 pub(super) fn f1(set: &Recorded, coordinate: &str, above: f64, curve: &[(f64, f64)]) -> f64 {
     let records = set.data.records.iter().zip(&set.noise_free);
     let x: Vec<f64> = records

@@ -43,7 +43,7 @@ pub struct Row {
     pub group: Option<Group>,
     /// Name of the family.
     pub family: String,
-    /// What is hidden, by the plant's name.
+    /// The hidden effect, by the plant's name.
     pub label: String,
     /// Noise, and nuisances where there are any.
     pub circumstances: String,

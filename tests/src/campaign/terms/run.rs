@@ -1,4 +1,4 @@
-//! Runs a case as a user would: a folder, `identify`, `discover`, the written model.
+//! Runs a case like a user: a folder, `identify`, `discover`, the written model.
 
 use std::fs;
 use std::path::Path;
@@ -133,7 +133,7 @@ fn region(row: &Row, truth: &plant::Truth, set: &Recorded) -> f64 {
     }
 }
 
-/// The larger relative error of the flow's two time constants, where the flow and the model have no others.
+/// The larger relative error of the flow's two time constants, if the flow and the model have no others.
 fn bias(plan: &RigPlan, model: &Model) -> Option<f64> {
     let plain = matches!(plan.plant.character, Character::FirstOrder);
     let ([a], [c], true) = (&model.a[..], &model.c[..], plain) else {

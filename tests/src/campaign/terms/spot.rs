@@ -54,7 +54,7 @@ impl Truth {
     }
 }
 
-/// A factor of a coordinate: its kind, and its time where it has one (s).
+/// A factor of a coordinate: its kind, and its time if it has one (s).
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Factor<'a> {
     kind: &'a str,
@@ -83,9 +83,9 @@ impl<'a> Factor<'a> {
     }
 }
 
-/// The factors of a coordinate at a place. A flow goes back in proportion to y and a sensor shows in proportion
-/// to the reading: whether a term is one of the rate or of the level, of the sensitivity or of the zero, is
-/// not counted, unless it depends on nothing else.
+/// The factors of a coordinate at a place. A flow returns in proportion to y, and a sensor reads in proportion to
+/// y. The distinction between a term of the rate and of the level, or of the sensitivity and of the offset, is
+/// therefore not counted, unless the term depends on nothing else.
 fn factors<'a>(place: &str, coordinate: &'a str) -> Vec<Factor<'a>> {
     let all: Vec<Factor<'a>> = coordinate.split(" × ").map(Factor::of).collect();
     let own = |factor: &Factor<'_>| match place {

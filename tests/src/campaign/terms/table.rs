@@ -111,10 +111,9 @@ fn by(rows: &[&Row], what: &str, of: impl Fn(&Row) -> &str) -> String {
 }
 
 fn nulls(rows: &[&Row]) -> String {
-    let mut text =
-        "| what there is | rigs | a term told | true anyway | identify s | discover s |\n\
+    let mut text = "| physics | rigs | a term reported | true anyway | identify s | discover s |\n\
          |---|---|---|---|---|---|\n"
-            .to_owned();
+        .to_owned();
     let mut line = |what: &str, own: &[&Row]| {
         let true_ = |row: &Row| !row.terms.is_empty() && !row.is_needless();
         let _ = writeln!(
@@ -187,7 +186,7 @@ fn totals(beyond: &[&Row], single: &[&Row], nothing: &[&Row]) -> String {
         &Row::has_coordinate_in_set,
     );
     line(
-        "a term told where nothing is missing",
+        "a term reported although nothing is missing",
         nothing,
         &Row::is_needless,
     );

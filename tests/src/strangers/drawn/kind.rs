@@ -1,4 +1,4 @@
-//! The kinds of records that strangers bring.
+//! The kinds of records from other loggers.
 
 use super::plant::Plant;
 use super::{chance, logarithmic, normal};
@@ -20,12 +20,12 @@ impl Record {
     }
 }
 
-/// Records of a rig and what is right of them.
+/// Records of a rig and the right answer for them.
 #[derive(Clone, Debug)]
 pub(super) struct Drawn {
     pub(super) period_s: f64,
     pub(super) records: Vec<Record>,
-    /// What the interval of `delay` has to contain, samples; none where the command has no edges to measure.
+    /// Value that the interval of `delay` must contain, samples; `None` if the command has no measurable edges.
     pub(super) dead_time: Option<f64>,
     /// The channel that drives y as well.
     pub(super) input: Option<&'static str>,
@@ -158,7 +158,7 @@ impl Rig {
         }
     }
 
-    /// With a second lag, two times in five.
+    /// With a second lag in two of five cases.
     fn draw_any_order(rng: &mut ChaCha8Rng) -> Self {
         let mut rig = Self::draw(rng);
         if chance(rng, 0.4) {
@@ -173,7 +173,8 @@ impl Rig {
             .push(self.plant.lags[0] * rng.random_range(0.1..0.7));
     }
 
-    /// A switched command that begins with `first`: first a rest, then pieces of 0.3 to 1.7 times `mean` time constants.
+    /// A switched command that begins with `first`: first a rest, then pieces of 0.3 to 1.7 times `mean` time
+    /// constants.
     fn switched(&self, rng: &mut ChaCha8Rng, first: f64, mean: f64) -> Vec<f64> {
         let mut u = vec![first; rng.random_range(20..100)];
         let mut now = first;
@@ -357,7 +358,7 @@ fn outliers(rng: &mut ChaCha8Rng) -> Drawn {
     rig.of(vec![Record { u, y, channel }])
 }
 
-/// A quarter of the command's gain, and a lag and a dead time of its own.
+/// A quarter of the command's gain, and a separate lag and dead time.
 fn measured_input(rng: &mut ChaCha8Rng) -> Drawn {
     let rig = Rig::draw(rng);
     let u = rig.switched(rng, 0.0, 3.0);
@@ -379,7 +380,7 @@ fn measured_input(rng: &mut ChaCha8Rng) -> Drawn {
         "; fan: gain {:.4}, lag {:.1} samples, dead time {} samples",
         second.gain, second.lags[0], second.dead_time
     );
-    // An edge of the command is often answered together with one of the fan.
+    // Otherwise the response to an edge of the command often coincides with one to the fan.
     (drawn.dead_time, drawn.input) = (None, Some("fan"));
     drawn
 }

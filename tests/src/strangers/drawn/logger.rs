@@ -1,4 +1,4 @@
-//! How a logger writes a record: names, separators, clock, words for the command.
+//! Formats of loggers: names, separators, clock, words for the command.
 
 use super::chance;
 use super::kind::{Drawn, Record};
@@ -11,7 +11,7 @@ use std::fmt::Write as _;
 enum Clock {
     /// Seconds from the start.
     Seconds,
-    /// Milliseconds from the start; the header says so.
+    /// Milliseconds from the start; the header states the unit.
     Milliseconds,
     /// Milliseconds since 1970.
     Epoch,
@@ -46,7 +46,7 @@ impl Logger {
         names: ["t", "u", "y"],
     };
 
-    /// Habits that suit the records: whole milliseconds can be written of periods from a millisecond on.
+    /// Formats that suit the records: whole milliseconds require a period of at least a millisecond.
     pub(super) fn draw(rng: &mut ChaCha8Rng, drawn: &Drawn) -> Self {
         let clocks = [
             Clock::Seconds,
@@ -109,7 +109,7 @@ impl Logger {
     }
 
     fn number(&self, value: f64) -> String {
-        // Nine digits, as a good logger prints.
+        // Nine digits, as from an accurate logger.
         let text = format!("{value:.8e}");
         let plain: f64 = text.parse().unwrap_or(value);
         match self.decimal_comma {
@@ -136,7 +136,7 @@ impl Logger {
     }
 }
 
-/// Date and time of day so many milliseconds after the start; a record ends within the month.
+/// Date and time of day this many milliseconds after the start; a record ends within the month.
 fn iso(ms: u64) -> String {
     let (seconds, ms) = (ms / 1000, ms % 1000);
     let (minutes, s) = (seconds / 60, seconds % 60);

@@ -1,7 +1,7 @@
-//! Records of strangers drawn from a seed: a campaign on rigs, clocks and loggers that nobody chose.
+//! Records in the formats of other loggers drawn from a seed: random rigs, clocks and formats.
 //!
-//! Each set is a folder with the logger's files and an `expected.toml`, and is run and checked as the sets of the project
-//! are. The plants are linear: what a set hides beyond that is a second input in some, and nothing in the others.
+//! Each set is a folder with the logger's files and an `expected.toml`, and is run and checked like the project's
+//! sets. The plants are linear; some sets have a second input, the others hide nothing.
 
 mod kind;
 mod logger;
@@ -17,8 +17,8 @@ use std::path::{Path, PathBuf};
 use kind::{Drawn, KINDS};
 use logger::Logger;
 
-/// Writes `count` sets of the campaign with this seed below `folder`, kinds in turn, and gives the folder of the seed.
-/// An earlier run's sets are replaced.
+/// Writes `count` sets of the campaign with this seed below `folder`, kinds in turn, and returns the folder of the
+/// seed. Sets of an earlier run are replaced.
 ///
 /// # Errors
 /// Files that cannot be written, with their path.

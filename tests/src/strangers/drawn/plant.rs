@@ -1,4 +1,4 @@
-//! Linear plants in continuous time: lags in series behind a dead time, stepped ten times a sample.
+//! Linear plants in continuous time: lags in series behind a dead time, with ten steps per sample.
 
 use super::normal;
 use rand_chacha::ChaCha8Rng;
@@ -14,7 +14,7 @@ pub(super) struct Plant {
     pub(super) gain: f64,
     /// y at rest without command.
     pub(super) level: f64,
-    /// The command before the first sample, for long enough to be at rest.
+    /// The command before the first sample, long enough to be at rest.
     pub(super) before: f64,
 }
 
@@ -22,7 +22,7 @@ pub(super) struct Plant {
 struct Running<'a> {
     plant: &'a Plant,
     states: Vec<f64>,
-    /// Commands of the steps that are under way, oldest first.
+    /// Commands of the steps within the dead time, oldest first.
     under_way: std::collections::VecDeque<f64>,
 }
 
@@ -66,8 +66,8 @@ impl Plant {
         u.iter().map(sample).collect()
     }
 
-    /// Command and y of `n` samples under a thermostat that reads y with white noise of standard deviation `noise` and
-    /// switches `hysteresis` (in units of the gain) beside half of the gain.
+    /// Command and y of `n` samples under a thermostat. It reads y with white noise of standard deviation `noise`
+    /// and switches at half of the gain plus and minus `hysteresis` (in units of the gain).
     pub(super) fn thermostat(
         &self,
         n: usize,

@@ -254,7 +254,7 @@ fn a_rig_is_calibrated() {
 
 #[test]
 fn a_rig_without_air_or_at_a_rail_is_not_calibrated() {
-    for (reading, word) in [(0, "steady blowing"), (4095, "shut the valve")] {
+    for (reading, word) in [(0, "steady blowing"), (4095, "closed the valve")] {
         let (hands, line) = board();
         hands.no_air.store(true, Ordering::Relaxed);
         hands.reading.store(reading, Ordering::Relaxed);

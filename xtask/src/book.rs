@@ -236,7 +236,7 @@ fn page(effect: &Effect, simulated: Option<&str>) -> String {
             text,
             "\n## Residual\n\n![Response with and without {0}, and their difference]({0}.svg)\n\nSimulated{with}. Above: y \
              with the effect, and y of the same model without it. Below: the difference, which is\nthe residual of the model \
-             without the effect. A refit of the other parameters reduces it and keeps its characteristic part.\n",
+             without the effect. A refit of the other parameters makes it smaller.\n",
             effect.name
         );
     }

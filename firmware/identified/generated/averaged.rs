@@ -15,19 +15,19 @@ use model_core::self_test::Golden;
 pub const SAMPLE_PERIOD_S: f32 = 0.001;
 /// W, samples.
 pub const WINDOW: u32 = 250;
-/// Readings that are averaged before they are compared with the model.
+/// Number of readings whose mean is compared with the model.
 pub const READINGS: usize = WINDOW as usize;
-/// Outputs kept: more than the longest lag, and no less than the averaging window.
+/// Stored outputs: more than the longest lag, at least the averaging window.
 pub const OUTPUTS: usize = 307;
-/// Jet strengths kept: more than the longest input delay.
+/// Stored jet strengths: more than the longest input delay.
 pub const JETS: usize = 670;
 /// Measured channels that the effects need, in the order in which they are passed.
 pub const CHANNELS: [&str; 0] = [];
 /// Usual values of the channels, in their units.
 pub const REFERENCES: [f32; 0] = [];
-/// The share of a full jet at a command in the unit of the records: 0.0 is no jet, 1.0 a full one.
+/// The command in the unit of the records as a fraction of a full jet: 0.0 is no jet, 1.0 a full jet.
 ///
-/// `Identified` and its state take this share, not the command.
+/// `Identified` and its state take this fraction, not the command.
 #[must_use]
 pub fn share(command: f32) -> f32 {
     command
@@ -39,7 +39,7 @@ pub type Jets = model_core::history::BitHistory<{ JETS.div_ceil(32) }>;
 
 /// The delay law.
 pub type Delay = model_core::delay::FixedDelay<[u16; 2]>;
-/// The effects, in the order of the physics.
+/// The effects, in physical order.
 pub type Effects = ();
 /// Structure, coefficients and delay law: N1, N2, N3 as identified.
 pub type Base = Params<f32, 2, 2, 2, Delay, ()>;
@@ -52,7 +52,7 @@ pub type IdentifiedState = StateOf<f32, Identified, Outputs, Jets>;
 pub const CONVENTION: LagConvention = LagConvention::OneStep;
 /// The response to jets of part strength.
 pub const GRADING: Grading = Grading::Proportional;
-/// d, what drives the flow without jets.
+/// d, the constant drive of the flow without jets.
 pub const CONSTANT: f32 = 0.0;
 /// τ_i, samples.
 pub const STATE_LAGS: [u16; 2] = [1, 269];
@@ -69,7 +69,7 @@ pub const C2: [f32; 2] = [-0.0085, 0.001];
 /// h_l, samples.
 pub const DELAYS: [u16; 2] = [49, 417];
 
-/// Longest time from a command to its first arrival, samples.
+/// Longest time from a command to its first arrival at the flow, samples.
 pub const FIRST_ARRIVAL: usize = checks::shortest(&DELAYS);
 const _: () = {
     assert!(CONSTANT.is_finite(), "the constant is not finite");
@@ -79,23 +79,23 @@ const _: () = {
     assert!(checks::finite(& C2), "a coefficient c is not finite");
     assert!(
         OUTPUTS >= checks::outputs_for(& STATE_LAGS, CONVENTION),
-        "a state lag reaches beyond the outputs kept"
+        "a state lag reaches beyond the stored outputs"
     );
     assert!(
         OUTPUTS >= checks::outputs_for(& PRODUCT_LAGS, CONVENTION),
-        "a product lag reaches beyond the outputs kept"
+        "a product lag reaches beyond the stored outputs"
     );
     assert!(
         OUTPUTS >= WINDOW as usize,
-        "the averaging window reaches beyond the outputs kept"
+        "the averaging window reaches beyond the stored outputs"
     );
     assert!(
         JETS >= DELAYS[0] as usize + READINGS,
-        "an input delay reaches beyond the commands kept"
+        "an input delay reaches beyond the stored commands"
     );
     assert!(
         JETS >= DELAYS[1] as usize + READINGS,
-        "an input delay reaches beyond the commands kept"
+        "an input delay reaches beyond the stored commands"
     );
 };
 
@@ -138,7 +138,7 @@ pub fn state(model: &Identified) -> IdentifiedState {
 
 /// CRC-32 of structure and coefficients, for the start-up self-test.
 pub const CHECKSUM: u32 = 0x5d67_305e;
-/// What the model says to the golden run, bit for bit, as the host computed it.
+/// Outputs of the model in the reference run, bit for bit as computed on the host.
 pub const GOLDEN: Golden<32> = Golden {
     every: 32,
     expected: [
@@ -151,7 +151,7 @@ pub const GOLDEN: Golden<32> = Golden {
     ],
 };
 
-/// Samples that the law looks ahead at most.
+/// Longest prediction horizon of the law, samples.
 pub const LOOK_AHEAD: usize = 1;
 /// The kind of law: pulses, (first sample, length) each, in a period that repeats.
 pub type Law = model_core::control::Pulses<[(u32, u32); 1]>;
@@ -170,7 +170,7 @@ const _: () = assert!(
     checks::train(LAW.train.period, & LAW.train.pulses, LAW.hold),
     "a pulse or a gap is shorter than the valve's shortest times"
 );
-/// What the law decides in its golden run, bit for bit, as the host computed it.
+/// Decisions of the law in its reference run, bit for bit as computed on the host.
 pub const LAW_GOLDEN: GoldenLaw = GoldenLaw {
     samples: 4096,
     expected: 0x9045_7318,

@@ -16,19 +16,19 @@ use model_core::self_test::Golden;
 pub const SAMPLE_PERIOD_S: f32 = 0.001;
 /// W, samples.
 pub const WINDOW: u32 = 250;
-/// Readings that are averaged before they are compared with the model.
+/// Number of readings whose mean is compared with the model.
 pub const READINGS: usize = 1;
-/// Outputs kept: more than the longest lag, and no less than the averaging window.
+/// Stored outputs: more than the longest lag, at least the averaging window.
 pub const OUTPUTS: usize = 500;
-/// Jet strengths kept: more than the longest input delay.
+/// Stored jet strengths: more than the longest input delay.
 pub const JETS: usize = 63;
 /// Measured channels that the effects need, in the order in which they are passed.
 pub const CHANNELS: [&str; 1] = ["temperature"];
 /// Usual values of the channels, in their units.
 pub const REFERENCES: [f32; 1] = [20.0];
-/// The share of a full jet at a command in the unit of the records: 0.0 is no jet, 1.0 a full one.
+/// The command in the unit of the records as a fraction of a full jet: 0.0 is no jet, 1.0 a full jet.
 ///
-/// `Identified` and its state take this share, not the command.
+/// `Identified` and its state take this fraction, not the command.
 #[must_use]
 pub fn share(command: f32) -> f32 {
     command
@@ -50,7 +50,7 @@ pub type Delay = model_core::delay::ScaledDelay<
     [f32; 1],
     true,
 >;
-/// The effects, in the order of the physics.
+/// The effects, in physical order.
 pub type Effects = (Effect1, (Effect2, (Effect3, ())));
 /// Structure, coefficients and delay law: N1, N2, N3 as identified.
 pub type Base = Params<f32, 5, 10, 1, Delay, ()>;
@@ -63,7 +63,7 @@ pub type IdentifiedState = StateOf<f32, Identified, Outputs, Jets>;
 pub const CONVENTION: LagConvention = LagConvention::OneStep;
 /// The response to jets of part strength.
 pub const GRADING: Grading = Grading::Proportional;
-/// d, what drives the flow without jets.
+/// d, the constant drive of the flow without jets.
 pub const CONSTANT: f32 = 0.0;
 /// τ_i, samples.
 pub const STATE_LAGS: [u16; 5] = [1, 44, 123, 479, 496];
@@ -90,7 +90,7 @@ pub const C1: [f32; 10] = [
 pub const DELAY_PARAMETERS: [f32; 3] = [47.35, 12.69, 20.18];
 /// Shortest and longest delay of the law, samples.
 pub const DELAY_RANGE: [f32; 2] = [47.35, 60.04];
-/// f_l, the delays of the inputs in units of the law's.
+/// f_l, the delays of the inputs relative to the law's.
 pub const DELAY_FACTORS: [f32; 1] = [1.0];
 /// supply-line-ringing: gain (-), frequency (Hz), decay_time (s).
 pub const EFFECT1: [f32; 3] = [0.4, 18.0, 0.06];
@@ -99,7 +99,7 @@ pub const EFFECT2: [f32; 3] = [0.3, 0.0213, 0.2];
 /// warm-film: sensitivity (1/K), warming_time (s).
 pub const EFFECT3: [f32; 2] = [0.03, 0.4];
 
-/// Longest time from a command to its first arrival, samples.
+/// Longest time from a command to its first arrival at the flow, samples.
 pub const FIRST_ARRIVAL: usize = (checks::smallest(&DELAY_FACTORS) * DELAY_RANGE[1]
     + 0.5) as usize;
 const _: () = {
@@ -109,19 +109,19 @@ const _: () = {
     assert!(checks::finite(& C1), "a coefficient c is not finite");
     assert!(
         OUTPUTS >= checks::outputs_for(& STATE_LAGS, CONVENTION),
-        "a state lag reaches beyond the outputs kept"
+        "a state lag reaches beyond the stored outputs"
     );
     assert!(
         OUTPUTS >= checks::outputs_for(& PRODUCT_LAGS, CONVENTION),
-        "a product lag reaches beyond the outputs kept"
+        "a product lag reaches beyond the stored outputs"
     );
     assert!(
         OUTPUTS >= WINDOW as usize,
-        "the averaging window reaches beyond the outputs kept"
+        "the averaging window reaches beyond the stored outputs"
     );
     assert!(
         JETS >= (DELAY_FACTORS[0] * DELAY_RANGE[1] + 0.5) as usize + READINGS,
-        "an input delay reaches beyond the commands kept"
+        "an input delay reaches beyond the stored commands"
     );
 };
 
@@ -187,7 +187,7 @@ pub fn state(model: &Identified) -> IdentifiedState {
 
 /// CRC-32 of structure and coefficients, for the start-up self-test.
 pub const CHECKSUM: u32 = 0xbe4d_6d44;
-/// What the model says to the golden run, bit for bit, as the host computed it.
+/// Outputs of the model in the reference run, bit for bit as computed on the host.
 pub const GOLDEN: Golden<32> = Golden {
     every: 32,
     expected: [
@@ -200,13 +200,13 @@ pub const GOLDEN: Golden<32> = Golden {
     ],
 };
 
-/// Samples that the law looks ahead at most.
+/// Longest prediction horizon of the law, samples.
 pub const LOOK_AHEAD: usize = 1;
 /// The kind of law: none was designed.
 pub type Law = ();
 /// No law was designed.
 pub const LAW: Law = ();
-/// What the law decides in its golden run, bit for bit, as the host computed it.
+/// Decisions of the law in its reference run, bit for bit as computed on the host.
 pub const LAW_GOLDEN: GoldenLaw = GoldenLaw {
     samples: 4096,
     expected: 0x0000_0000,

@@ -2,7 +2,7 @@
 //!
 //! - tool: host-fit 0.2.0
 //! - structure: full model, N1 = 1, N2 = 1, N3 = 1, window 20 samples, one-step lags (lag 1 is y_k)
-//! - command: 2.0 is no jet, 7.0 a full one; in Rust the model takes `share(command)`
+//! - command: 2.0 is no jet, 7.0 a full one; in Rust the model's input is `share(command)`
 //! - units: y is the normalised friction gain, u is 0 or 1, delays and lags are samples of 0.001 s
 
 use model_core::checks;
@@ -16,19 +16,19 @@ use model_core::self_test::Golden;
 pub const SAMPLE_PERIOD_S: f32 = 0.001;
 /// W, samples.
 pub const WINDOW: u32 = 20;
-/// Readings that are averaged before they are compared with the model.
+/// Number of readings whose mean is compared with the model.
 pub const READINGS: usize = 1;
-/// Outputs kept: more than the longest lag, and no less than the averaging window.
+/// Stored outputs: more than the longest lag, at least the averaging window.
 pub const OUTPUTS: usize = 20;
-/// Jet strengths kept: more than the longest input delay.
+/// Stored jet strengths: more than the longest input delay.
 pub const JETS: usize = 15;
 /// Measured channels that the effects need, in the order in which they are passed.
 pub const CHANNELS: [&str; 0] = [];
 /// Usual values of the channels, in their units.
 pub const REFERENCES: [f32; 0] = [];
-/// The share of a full jet at a command in the unit of the records: 2.0 is no jet, 7.0 a full one.
+/// The command in the unit of the records as a fraction of a full jet: 2.0 is no jet, 7.0 a full jet.
 ///
-/// `Identified` and its state take this share, not the command.
+/// `Identified` and its state take this fraction, not the command.
 #[must_use]
 pub fn share(command: f32) -> f32 {
     ((f64::from(command) - 2f64) / 5f64) as f32
@@ -40,7 +40,7 @@ pub type Jets = model_core::history::BitHistory<{ JETS.div_ceil(32) }>;
 
 /// The delay law.
 pub type Delay = model_core::delay::FixedDelay<[u16; 1]>;
-/// The effects, in the order of the physics.
+/// The effects, in physical order.
 pub type Effects = ();
 /// Structure, coefficients and delay law: N1, N2, N3 as identified.
 pub type Base = Params<f32, 1, 1, 1, Delay, ()>;
@@ -53,7 +53,7 @@ pub type IdentifiedState = StateOf<f32, Identified, Outputs, Jets>;
 pub const CONVENTION: LagConvention = LagConvention::OneStep;
 /// The response to jets of part strength.
 pub const GRADING: Grading = Grading::Proportional;
-/// d, what drives the flow without jets.
+/// d, the constant drive of the flow without jets.
 pub const CONSTANT: f32 = 0.0;
 /// τ_i, samples.
 pub const STATE_LAGS: [u16; 1] = [1];
@@ -68,7 +68,7 @@ pub const C1: [f32; 1] = [-0.01];
 /// h_l, samples.
 pub const DELAYS: [u16; 1] = [12];
 
-/// Longest time from a command to its first arrival, samples.
+/// Longest time from a command to its first arrival at the flow, samples.
 pub const FIRST_ARRIVAL: usize = checks::shortest(&DELAYS);
 const _: () = {
     assert!(CONSTANT.is_finite(), "the constant is not finite");
@@ -77,19 +77,19 @@ const _: () = {
     assert!(checks::finite(& C1), "a coefficient c is not finite");
     assert!(
         OUTPUTS >= checks::outputs_for(& STATE_LAGS, CONVENTION),
-        "a state lag reaches beyond the outputs kept"
+        "a state lag reaches beyond the stored outputs"
     );
     assert!(
         OUTPUTS >= checks::outputs_for(& PRODUCT_LAGS, CONVENTION),
-        "a product lag reaches beyond the outputs kept"
+        "a product lag reaches beyond the stored outputs"
     );
     assert!(
         OUTPUTS >= WINDOW as usize,
-        "the averaging window reaches beyond the outputs kept"
+        "the averaging window reaches beyond the stored outputs"
     );
     assert!(
         JETS >= DELAYS[0] as usize + READINGS,
-        "an input delay reaches beyond the commands kept"
+        "an input delay reaches beyond the stored commands"
     );
 };
 
@@ -132,7 +132,7 @@ pub fn state(model: &Identified) -> IdentifiedState {
 
 /// CRC-32 of structure and coefficients, for the start-up self-test.
 pub const CHECKSUM: u32 = 0x4a51_5937;
-/// What the model says to the golden run, bit for bit, as the host computed it.
+/// Outputs of the model in the reference run, bit for bit as computed on the host.
 pub const GOLDEN: Golden<32> = Golden {
     every: 32,
     expected: [
@@ -145,13 +145,13 @@ pub const GOLDEN: Golden<32> = Golden {
     ],
 };
 
-/// Samples that the law looks ahead at most.
+/// Longest prediction horizon of the law, samples.
 pub const LOOK_AHEAD: usize = 1;
 /// The kind of law: none was designed.
 pub type Law = ();
 /// No law was designed.
 pub const LAW: Law = ();
-/// What the law decides in its golden run, bit for bit, as the host computed it.
+/// Decisions of the law in its reference run, bit for bit as computed on the host.
 pub const LAW_GOLDEN: GoldenLaw = GoldenLaw {
     samples: 4096,
     expected: 0x0000_0000,

@@ -440,7 +440,7 @@ mod tests {
         assert!(message(&Averaging::over(f64::NAN), &text(&rows)).contains("period of NaN s"));
         let found = message(&Averaging::over(1.0), &text(&rows));
         assert!(
-            found.contains("raw.csv") && found.contains("300 samples left over of 1000"),
+            found.contains("raw.csv") && found.contains("300 samples left over; a period has 1000"),
             "{found}"
         );
         assert!(message(&Averaging::over(0.1), "t,u,y\n0,0,0\n").contains("raw.csv"));

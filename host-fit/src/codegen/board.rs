@@ -206,7 +206,7 @@ mod tests {
         refused(&|model| model.law = None, ["`law`", "host-fit design"]);
         refused(
             &|model| (model.command.off, model.command.full) = (1.0, 0.0),
-            ["`command`", "the other way round"],
+            ["`command`", "Record u with 1 for a jet"],
         );
         refused(
             &|model| model.sample_period_s = 1.0,

@@ -176,7 +176,7 @@ mod tests {
         check(&svg);
         let words = words(&svg);
         assert!(words.contains("rising edges (1)") && words.contains("falling edges (1)"));
-        assert!(words.contains("3 edges without"));
+        assert!(words.contains("without 3 edges"));
         assert!(words.contains("samples of 1 ms"));
     }
 

@@ -403,7 +403,7 @@ mod tests {
             (entry("a.csv").replace("\"a\"", "\"\""), "key `name`"),
             (
                 format!("{}lead_samples = 3\n", entry("a.csv")),
-                "dataset.toml, key `lead_samples`: the first 3 samples",
+                "dataset.toml, key `lead_samples`: lead_samples is 3",
             ),
             (
                 format!("{}u_before = inf\n", entry("a.csv")),

@@ -142,7 +142,8 @@ mod tests {
             .unwrap_err()
             .to_string();
         assert!(
-            error.contains("--reach 0.3s is 0 samples of 8 s") && error.contains("32.000000s"),
+            error.contains("--reach 0.3s corresponds to 0 samples of 8 s")
+                && error.contains("32.000000s"),
             "{error}"
         );
         let fits = TimeSpan::Seconds(40.0).samples_within(8.0, "--reach", 4..=10_000);

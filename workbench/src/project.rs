@@ -97,6 +97,15 @@ pub fn beneath(folder: &Path, relative: &Path) -> Result<PathBuf, ProjectError> 
     Ok(path)
 }
 
+/// Whether a file is a model or a result of a step on one: `model-1.toml`, `model-1-loop.svg`, `diagnosis-1.html`.
+fn is_result(name: &str) -> bool {
+    let (stem, _) = name.rsplit_once('.').unwrap_or((name, ""));
+    let number = stem.split('-').nth(1).unwrap_or_default();
+    stem.starts_with(char::is_alphabetic)
+        && !number.is_empty()
+        && number.bytes().all(|b| b.is_ascii_digit())
+}
+
 /// A project folder that is open.
 #[derive(Debug)]
 pub struct Project {
@@ -170,6 +179,49 @@ impl Project {
         }
         data.clone_into(&mut self.tree.data);
         Ok(())
+    }
+
+    /// Says of which data set the next models are. Models of another one are moved with their results into a folder
+    /// `earlier-1`, `earlier-2` …, which is a project of its own and is returned.
+    ///
+    /// # Errors
+    /// [`ProjectError`] when a file cannot be copied; the project is then as before.
+    pub fn start_anew(&mut self, data: &str) -> Result<Option<PathBuf>, ProjectError> {
+        if self.tree.nodes.is_empty() || self.tree.data == data {
+            self.set_data(data)?;
+            return Ok(None);
+        }
+        let earlier = (1..).map(|n| self.folder.join(format!("earlier-{n}")));
+        let Some(earlier) = earlier.into_iter().find(|folder| !folder.exists()) else {
+            return Err(ProjectError::OtherData(self.folder.clone()));
+        };
+        let io = |path: &Path| {
+            let path = path.to_path_buf();
+            move |cause| ProjectError::Io { path, cause }
+        };
+        fs::create_dir_all(&earlier).map_err(io(&earlier))?;
+        let entries = fs::read_dir(&self.folder).map_err(io(&self.folder))?;
+        let files = entries
+            .flatten()
+            .filter(|e| e.file_type().is_ok_and(|kind| kind.is_file()));
+        let results = files.map(|entry| entry.file_name());
+        let results: Vec<_> = results
+            .filter(|name| is_result(&name.to_string_lossy()))
+            .collect();
+        for name in results.iter().map(AsRef::as_ref).chain([Path::new(TREE)]) {
+            let from = beneath(&self.folder, name)?;
+            fs::copy(&from, earlier.join(name)).map_err(io(&from))?;
+        }
+        self.keep(Tree {
+            format_version: FORMAT,
+            data: data.to_owned(),
+            ..Tree::default()
+        })?;
+        for name in &results {
+            let path = self.folder.join(name);
+            fs::remove_file(&path).map_err(io(&path))?;
+        }
+        Ok(Some(earlier))
     }
 
     /// The folder.

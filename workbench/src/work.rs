@@ -2,6 +2,7 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
 
 use serde_json::{Value, json};
 use tokio::sync::broadcast;
@@ -25,6 +26,9 @@ struct Running {
     now: String,
     /// Best value of the running search so far, over its evaluations.
     best: Vec<(usize, f64)>,
+    /// Most evaluations of that search; 0 for none.
+    budget: usize,
+    started: Instant,
 }
 
 impl Running {
@@ -83,15 +87,18 @@ impl Work {
         self.tell(&json!({"kind": "now", "words": words}));
     }
 
-    /// The best value of a search after this many evaluations.
-    pub fn best(&self, evaluations: usize, best: f64) {
+    /// The best value of a search after this many evaluations of a `budget`.
+    pub fn best(&self, evaluations: usize, budget: usize, best: f64) {
         if !best.is_finite() {
             return;
         }
         if let Some(running) = lock(&self.shared.running).as_mut() {
             running.note(evaluations, best);
+            running.budget = budget;
         }
-        self.tell(&json!({"kind": "best", "evaluations": evaluations, "best": best}));
+        self.tell(
+            &json!({"kind": "best", "evaluations": evaluations, "budget": budget, "best": best}),
+        );
     }
 
     /// Something to know.
@@ -112,7 +119,10 @@ impl Work {
     pub(crate) fn state(&self) -> Value {
         match lock(&self.shared.running).as_ref() {
             None => Value::Null,
-            Some(r) => json!({"name": r.name, "now": r.now, "best": r.best}),
+            Some(r) => json!({
+                "name": r.name, "now": r.now, "best": r.best, "budget": r.budget,
+                "elapsed_s": r.started.elapsed().as_secs_f64(),
+            }),
         }
     }
 
@@ -126,6 +136,8 @@ impl Work {
             name: name.to_owned(),
             now: String::new(),
             best: Vec::new(),
+            budget: 0,
+            started: Instant::now(),
         });
         drop(running);
         self.shared.cancel.store(false, Ordering::Relaxed);
@@ -152,11 +164,11 @@ mod tests {
         let work = Work::new();
         assert!(work.begin("identifying"));
         for (evaluations, best) in [(1, 3.0), (2, 2.0), (5, 2.0), (9, 2.0)] {
-            work.best(evaluations, best);
+            work.best(evaluations, 0, best);
         }
         assert_eq!(work.state()["best"], json!([[1, 3.0], [2, 2.0], [9, 2.0]]));
         for (evaluations, best) in [(1, 4.0), (3, 1.0), (4, f64::INFINITY)] {
-            work.best(evaluations, best);
+            work.best(evaluations, 0, best);
         }
         assert_eq!(work.state()["best"], json!([[1, 4.0], [3, 1.0]]));
         work.end(None);
@@ -168,7 +180,7 @@ mod tests {
         let work = Work::new();
         work.begin("identifying");
         for n in 0..50_000 {
-            work.best(n, 1.0 / (n as f64 + 1.0));
+            work.best(n, 0, 1.0 / (n as f64 + 1.0));
         }
         let state = work.state();
         let kept = state["best"].as_array().unwrap();

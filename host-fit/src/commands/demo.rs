@@ -81,6 +81,14 @@ const TARGET: f64 = 0.7;
 /// Shortest on and off times of the valve, samples.
 const TIMES: HoldTimes = HoldTimes { on: 10, off: 10 };
 
+/// The files of the bundled ramp with a hidden effect: names and contents.
+pub(super) fn bundled_ramp() -> impl Iterator<Item = (&'static str, &'static str)> {
+    let ramp = FILES
+        .iter()
+        .map(|(name, text)| (name.split_once('/'), *text));
+    ramp.filter_map(|(name, text)| Some((name.filter(|n| n.0 == "hidden-ramp")?.1, text)))
+}
+
 /// A small structure, for speed.
 fn request(delay: DelayKind) -> IdentifyRequest {
     IdentifyRequest {
@@ -361,16 +369,7 @@ fn the_loop(
         }
     });
     report.section("4. The generated law in the loop, at 1 kHz on the plant");
-    report.figure(
-        &loop_picture(&LoopPicture {
-            title: "Held at 0.7",
-            air: false,
-            reference: &[TARGET; SAMPLES],
-            runs: &runs,
-            seconds: 3.0,
-        }),
-        "",
-    );
+    report.columns().cell();
     let table: Vec<Vec<String>> = rows
         .iter()
         .map(|r| {
@@ -394,6 +393,18 @@ fn the_loop(
         ],
         &table,
     );
+    report.end_columns();
+    report.figure(
+        &loop_picture(&LoopPicture {
+            title: "Held at 0.7",
+            air: false,
+            reference: &[TARGET; SAMPLES],
+            runs: &runs,
+            seconds: 3.0,
+        }),
+        "",
+    );
+    report.end_columns();
     console.say("\n4. the generated law in the loop, on the plant: hold y at 0.7")?;
     let head = ["controller", "mean y", "rms error", "switches/s", "air"];
     console.say(&indented(&aligned(&head, &table, 1)))?;

@@ -6,15 +6,15 @@ use host_fit::design::{Margin, Proof};
 use host_fit::diagnose::Diagnosis;
 use host_fit::experiment::Separation;
 use host_fit::picture::{
-    ClosedLoop, LabelledRun, Ladder, LadderRecord, LadderStep, LoopRun, Overlay, Region, Regions,
-    closed_loop, ladder, overlay, regions,
+    ClosedLoop, LabelledRun, Ladder, LadderRecord, LadderStep, LoopRun, Overlay, Picture, Region,
+    Regions, closed_loop, ladder, overlay, regions,
 };
 use host_fit::simulate::Signals;
 
 use super::words::role_name;
 
 /// One picture per record: measurement and free runs, labelled.
-pub(crate) fn overlays(records: &[Record], runs: &[(&str, &[Vec<f64>])]) -> Vec<(String, String)> {
+pub(crate) fn overlays(records: &[Record], runs: &[(&str, &[Vec<f64>])]) -> Vec<(String, Picture)> {
     let picture = |(index, record): (usize, &Record)| {
         let models: Vec<LabelledRun<'_>> = runs
             .iter()
@@ -43,7 +43,7 @@ pub(crate) fn overlays(records: &[Record], runs: &[(&str, &[Vec<f64>])]) -> Vec<
 }
 
 /// The validation error step by step, as a picture.
-pub(crate) fn ladder_picture(diagnosis: &Diagnosis, set: &DataSet) -> String {
+pub(crate) fn ladder_picture(diagnosis: &Diagnosis, set: &DataSet) -> Picture {
     let finite = diagnosis
         .ladder
         .iter()
@@ -65,7 +65,7 @@ pub(crate) fn ladder_picture(diagnosis: &Diagnosis, set: &DataSet) -> String {
 }
 
 /// The discriminating experiment: its command and the prediction of each model.
-pub(crate) fn experiment_picture(separation: &Separation) -> String {
+pub(crate) fn experiment_picture(separation: &Separation) -> Picture {
     let experiment = &separation.experiment;
     let named = separation.effects.len() == separation.models.len();
     let numbered = separation.models.iter().enumerate();
@@ -113,7 +113,7 @@ pub(crate) fn experiment_picture(separation: &Separation) -> String {
 }
 
 /// The law and its reference on the same plant.
-pub(crate) fn proof_picture(proof: &Proof, tracks: bool) -> String {
+pub(crate) fn proof_picture(proof: &Proof, tracks: bool) -> Picture {
     let runs = [
         (proof.compared_name, &proof.compared),
         ("the designed law", &proof.trace),
@@ -127,13 +127,13 @@ pub(crate) fn proof_picture(proof: &Proof, tracks: bool) -> String {
         air: true,
         reference: &reference,
         runs: &runs,
-        // Half of a trial.
-        seconds: 0.5 * proof.trace.samples.len() as f64 * proof.trace.sample_period_s,
+        // A quarter of a trial: single pulses are seen.
+        seconds: 0.25 * proof.trace.samples.len() as f64 * proof.trace.sample_period_s,
     })
 }
 
 /// The tolerated errors of the model, two at a time.
-pub(crate) fn margin_picture(margin: &Margin) -> String {
+pub(crate) fn margin_picture(margin: &Margin) -> Picture {
     let percent = |contour: &[[f64; 2]]| -> Vec<[f64; 2]> {
         contour
             .iter()
@@ -179,7 +179,7 @@ pub(crate) struct LoopPicture<'a> {
     pub(crate) seconds: f64,
 }
 
-pub(crate) fn loop_picture(picture: &LoopPicture<'_>) -> String {
+pub(crate) fn loop_picture(picture: &LoopPicture<'_>) -> Picture {
     struct Series {
         y: Vec<f64>,
         u: Vec<f64>,

@@ -6,8 +6,8 @@ use host_fit::discover::{Entry, FoundTerm, TRACED, Trace};
 use host_fit::indicators::{Scores, score};
 use host_fit::model::Model;
 use host_fit::picture::{
-    BandPoint, Candidate, Column, CurvePlot, Living, Ranking, Report, Stretches, WhereItFails,
-    curve, ranking,
+    BandPoint, Candidate, Column, CurvePlot, Living, Picture, Ranking, Report, Stretches,
+    WhereItFails, curve, ranking,
 };
 use host_fit::residual::Failures;
 use host_fit::steps::{Answer, Comparison, Extension, Finding, Identification, SideBySide, Terms};
@@ -16,8 +16,8 @@ use super::drawings::{experiment_picture, ladder_picture, margin_picture, proof_
 use super::page_parts::{Run, Stretch, card, checks, stretch_picture, worst_stretch};
 use super::tried::Tried;
 use super::words::{
-    SIDE_BY_SIDE, Words, describe, ladder_rows, named_first, ranking_rows, role_name, score_rows,
-    side_by_side_rows,
+    SIDE_BY_SIDE, TRIALS, Words, describe, ladder_rows, named_first, ranking_rows, role_name,
+    score_rows, side_by_side_rows, trial_caption, trial_rows,
 };
 
 /// The page of a comparison, made by `command`.
@@ -188,7 +188,7 @@ pub(crate) fn finding_lead(
     runs.extend(found.runs_before.as_deref().map(|runs| ("as given", runs)));
     runs.extend(found.runs.as_deref().map(|runs| (after_label(found), runs)));
     let ladder = ladder_picture(&found.diagnosis, set);
-    let falling = (found.diagnosis.ladder.len() > 1).then_some(ladder.as_str());
+    let falling = (found.diagnosis.ladder.len() > 1).then_some(&ladder);
     lead(report, &found.answer, falling, &records, &runs)
 }
 
@@ -263,7 +263,7 @@ pub(crate) fn discovery_lead(
 ) -> Option<Stretch> {
     let curve = found.discovery.terms.first().map(term_picture);
     let runs = discovery_runs(found);
-    lead(report, &found.answer, curve.as_deref(), records, &runs)
+    lead(report, &found.answer, curve.as_ref(), records, &runs)
 }
 
 fn discovery_runs(found: &Terms) -> Vec<(&str, &[Vec<f64>])> {
@@ -326,7 +326,7 @@ pub(crate) fn discovery_details(
 pub(crate) fn lead(
     report: &mut Report,
     answer: &Answer,
-    picture: Option<&str>,
+    picture: Option<&Picture>,
     records: &[Record],
     runs: &[(&str, &[Vec<f64>])],
 ) -> Option<Stretch> {
@@ -373,7 +373,14 @@ pub(super) fn law(model: &Model, tried: &Tried, tracks: bool, command: &str) -> 
         );
     }
     report.section("Every trial");
-    report.code(&tried.proof.words());
+    report.table(
+        &trial_caption(&tried.proof),
+        &TRIALS.map(|(name, is_number)| match is_number {
+            true => Column::Number(name),
+            false => Column::Text(name),
+        }),
+        &trial_rows(&tried.proof),
+    );
     report.provenance("tool", concat!("host-fit ", env!("CARGO_PKG_VERSION")));
     report.provenance("command", command);
     report.provenance("data", &model.training.data_hash);
@@ -430,7 +437,7 @@ fn report_trace(report: &mut Report, trace: &Trace) {
 }
 
 /// The curve of a term.
-pub(super) fn term_picture(term: &FoundTerm) -> String {
+pub(super) fn term_picture(term: &FoundTerm) -> Picture {
     let points: Vec<BandPoint> = term
         .curve
         .iter()
@@ -578,7 +585,7 @@ fn report_failures(report: &mut Report, failures: &Failures) {
     );
 }
 
-pub(super) fn failures_picture(failures: &Failures) -> String {
+pub(super) fn failures_picture(failures: &Failures) -> Picture {
     host_fit::picture::where_it_fails(&WhereItFails {
         title: "Error of the free run on the validation records",
         y_label: "rms error, y",
@@ -628,7 +635,7 @@ fn report_candidates(report: &mut Report, found: &Finding) {
 }
 
 /// Every candidate's validation error.
-pub(super) fn ranking_picture(diagnosis: &Diagnosis) -> String {
+pub(super) fn ranking_picture(diagnosis: &Diagnosis) -> Picture {
     let base = diagnosis
         .ladder
         .get(1)

@@ -4,7 +4,8 @@ use host_fit::analysis::{Residuals, correlations, poles, spectrum, step_response
 use host_fit::data::{Record, Use};
 use host_fit::model::Model;
 use host_fit::picture::{
-    Column, LabelledRun, Line, LinePlot, Overlay, Report, Tone, lines, overlay, significant,
+    Column, LabelledRun, Line, LinePlot, Overlay, Picture, Report, Tone, lines, overlay,
+    significant,
 };
 use host_fit::steps::{self, Answer};
 
@@ -94,9 +95,18 @@ pub(crate) fn stretch_picture(
     runs: &[(&str, &[Vec<f64>])],
     stretch: Stretch,
 ) {
-    let Some(record) = records.get(stretch.record) else {
-        return;
-    };
+    if let Some((picture, caption)) = stretch_figure(records, runs, stretch) {
+        report.figure(&picture, &caption);
+    }
+}
+
+/// The picture of [`stretch_picture`].
+pub(crate) fn stretch_figure(
+    records: &[Record],
+    runs: &[(&str, &[Vec<f64>])],
+    stretch: Stretch,
+) -> Option<Figure> {
+    let record = records.get(stretch.record)?;
     let rate = 1.0 / record.sample_period_s;
     let (from, to) = ((stretch.from * rate) as usize, (stretch.to * rate) as usize);
     let own: Vec<(&str, &Vec<f64>)> = runs
@@ -133,18 +143,38 @@ pub(crate) fn stretch_picture(
         models: &models,
         window_s: Some((record.t0 + stretch.from, record.t0 + stretch.to)),
     });
-    report.figure(
-        &svg,
-        &format!(
-            "The {} s of the validation records with the largest error. There: {errors}.",
-            significant(stretch.to - stretch.from, 2)
-        ),
+    let caption = format!(
+        "The {} s of the validation records with the largest error. There: {errors}.",
+        significant(stretch.to - stretch.from, 2)
     );
+    Some((svg, caption))
 }
+
+/// A picture with its caption.
+pub(crate) type Figure = (Picture, String);
 
 /// Residual correlations, residual spectrum, step responses and poles of each model.
 pub(crate) fn checks(report: &mut Report, records: &[Record], runs: &[Run<'_>]) {
     report.section("Residual tests");
+    report.columns();
+    for (picture, caption) in check_figures(records, runs) {
+        report.figure(&picture, &caption);
+    }
+    report.end_columns();
+    let rows = pole_rows(runs);
+    if rows.is_empty() {
+        return;
+    }
+    report.subsection("Poles");
+    let columns = POLES.map(|(name, is_number)| match is_number {
+        true => Column::Number(name),
+        false => Column::Text(name),
+    });
+    report.table(POLES_ARE, &columns, &rows);
+}
+
+/// The pictures of [`checks`].
+pub(crate) fn check_figures(records: &[Record], runs: &[Run<'_>]) -> Vec<Figure> {
     let residuals: Vec<Residuals> = runs
         .iter()
         .map(|run| Residuals::of(records, run.runs))
@@ -156,7 +186,7 @@ pub(crate) fn checks(report: &mut Report, records: &[Record], runs: &[Run<'_>]) 
         each.collect::<Vec<_>>().join(", ")
     };
     let last = tested.last().cloned().unwrap_or_default();
-    report.columns();
+    let mut figures = Vec::new();
     let auto: Vec<Line<'_>> = runs
         .iter()
         .zip(&tested)
@@ -168,8 +198,8 @@ pub(crate) fn checks(report: &mut Report, records: &[Record], runs: &[Run<'_>]) 
             dashed: false,
         })
         .collect();
-    report.figure(
-        &lines(&LinePlot {
+    figures.push((
+        lines(&LinePlot {
             title: "Residual autocorrelation",
             x_label: "lag (s)",
             y_label: "correlation",
@@ -177,12 +207,11 @@ pub(crate) fn checks(report: &mut Report, records: &[Record], runs: &[Run<'_>]) 
             band: Some((last.0.band, "95 % band of a white residual")),
             log_x: false,
         }),
-        &format!(
-            "95 % of the lags of a white residual lie within the band; coloured measurement noise exceeds it \
-                 as well. Outside: {}.",
+        format!(
+            "95 % of the lags of a white residual lie within the band; coloured measurement noise exceeds it as well. Outside: {}.",
             outside(&|i| tested[i].0.outside)
         ),
-    );
+    ));
     let cross: Vec<Line<'_>> = runs
         .iter()
         .zip(&tested)
@@ -194,8 +223,8 @@ pub(crate) fn checks(report: &mut Report, records: &[Record], runs: &[Run<'_>]) 
             dashed: false,
         })
         .collect();
-    report.figure(
-        &lines(&LinePlot {
+    figures.push((
+        lines(&LinePlot {
             title: "Cross-correlation of u and residual",
             x_label: "lag of the residual behind u (s)",
             y_label: "correlation",
@@ -203,18 +232,17 @@ pub(crate) fn checks(report: &mut Report, records: &[Record], runs: &[Run<'_>]) 
             band: Some((last.1.band, "95 % band of an independent residual")),
             log_x: false,
         }),
-        &format!(
+        format!(
             "Peaks outside the band at positive lags are dynamics from u to y that the model lacks. Outside: {}.",
             outside(&|i| tested[i].1.outside)
         ),
-    );
-    spectra(report, runs, &residuals);
-    responses(report, runs);
-    report.end_columns();
-    pole_table(report, runs);
+    ));
+    figures.extend(spectra(runs, &residuals));
+    figures.extend(responses(runs));
+    figures
 }
 
-fn spectra(report: &mut Report, runs: &[Run<'_>], residuals: &[Residuals]) {
+fn spectra(runs: &[Run<'_>], residuals: &[Residuals]) -> Option<Figure> {
     let spectra: Vec<_> = residuals.iter().map(spectrum).collect();
     let decibels = |hz: &[f64], density: &[f64]| -> Vec<(f64, f64)> {
         let pairs = hz.iter().zip(density);
@@ -222,9 +250,7 @@ fn spectra(report: &mut Report, runs: &[Run<'_>], residuals: &[Residuals]) {
             .map(|(hz, s)| (*hz, 10.0 * s.max(f64::MIN_POSITIVE).log10()))
             .collect()
     };
-    let Some(first) = spectra.first().filter(|s| !s.hz.is_empty()) else {
-        return;
-    };
+    let first = spectra.first().filter(|s| !s.hz.is_empty())?;
     let output = decibels(&first.hz, &first.output);
     let noise = first
         .noise
@@ -255,8 +281,8 @@ fn spectra(report: &mut Report, runs: &[Run<'_>], residuals: &[Residuals]) {
             dashed: false,
         });
     }
-    report.figure(
-        &lines(&LinePlot {
+    Some((
+        lines(&LinePlot {
             title: "Residual spectrum",
             x_label: "frequency (Hz)",
             y_label: "density (dB re 1 y²/Hz)",
@@ -264,11 +290,11 @@ fn spectra(report: &mut Report, runs: &[Run<'_>], residuals: &[Residuals]) {
             band: None,
             log_x: true,
         }),
-        "Welch's estimate. If the residual exceeds the noise at a frequency, the model lacks dynamics there.",
-    );
+        "Welch's estimate. If the residual exceeds the noise at a frequency, the model lacks dynamics there.".to_owned(),
+    ))
 }
 
-fn responses(report: &mut Report, runs: &[Run<'_>]) {
+fn responses(runs: &[Run<'_>]) -> Option<Figure> {
     let found: Vec<_> = runs.iter().map(|run| step_response(run.model)).collect();
     let labels: Vec<[String; 2]> = runs
         .iter()
@@ -295,10 +321,10 @@ fn responses(report: &mut Report, runs: &[Run<'_>]) {
         }
     }
     if drawn.is_empty() {
-        return;
+        return None;
     }
-    report.figure(
-        &lines(&LinePlot {
+    Some((
+        lines(&LinePlot {
             title: "Step response at two levels",
             x_label: "time since the step (s)",
             y_label: "change of y",
@@ -307,15 +333,29 @@ fn responses(report: &mut Report, runs: &[Run<'_>]) {
             log_x: false,
         }),
         "The command opens from rest (0 → 1), and closes from the steady state (1 → 0, sign reversed). For a \
-         linear plant the two responses are equal.",
-    );
+         linear plant the two responses are equal."
+            .to_owned(),
+    ))
 }
 
-fn pole_table(report: &mut Report, runs: &[Run<'_>]) {
+/// Columns of [`pole_rows`]: name, and whether it holds numbers.
+pub(crate) const POLES: [(&str, bool); 6] = [
+    ("model", false),
+    ("command", false),
+    ("modulus", true),
+    ("time constant, s", true),
+    ("frequency, Hz", true),
+    ("damping ratio", true),
+];
+
+/// What [`pole_rows`] are.
+pub(crate) const POLES_ARE: &str = "The slowest poles of the recursion with a constant command, without effects; one of each conjugate pair.";
+
+/// The slowest poles of each model.
+pub(crate) fn pole_rows(runs: &[Run<'_>]) -> Vec<Vec<String>> {
     const MOST: usize = 3;
     let number = |value: f64| significant(value, 3);
-    let rows: Vec<Vec<String>> = runs
-        .iter()
+    runs.iter()
         .flat_map(|run| {
             let own = poles(run.model, MOST).into_iter();
             own.map(|pole| {
@@ -333,23 +373,7 @@ fn pole_table(report: &mut Report, runs: &[Run<'_>]) {
                 ]
             })
         })
-        .collect();
-    if rows.is_empty() {
-        return;
-    }
-    report.subsection("Poles");
-    report.table(
-        "The slowest poles of the recursion with a constant command, without effects; one of each conjugate pair.",
-        &[
-            Column::Text("model"),
-            Column::Text("command"),
-            Column::Number("modulus"),
-            Column::Number("time constant, s"),
-            Column::Number("frequency, Hz"),
-            Column::Number("damping ratio"),
-        ],
-        &rows,
-    );
+        .collect()
 }
 
 #[cfg(test)]

@@ -3,14 +3,14 @@
 use super::law::DelayLawFit;
 use super::study::DelayStudy;
 use crate::data::Use;
-use crate::picture::{DelayEdge, DelayLawPlot, LawPoint, MeasuredDelay, delay_law};
+use crate::picture::{DelayEdge, DelayLawPlot, LawPoint, MeasuredDelay, Picture, delay_law};
 
 /// Number of points of the curve.
 const POINTS: usize = 200;
 
 /// Draws the measured delays of the identify records over ỹ, with the law and its confidence band. Returns SVG.
 #[must_use]
-pub fn draw_delays(study: &DelayStudy, title: &str, sample_period_s: f64) -> String {
+pub fn draw_delays(study: &DelayStudy, title: &str, sample_period_s: f64) -> Picture {
     let identify = || study.edges.iter().filter(|e| e.role == Use::Identify);
     let points: Vec<MeasuredDelay> = identify()
         .filter_map(|e| {

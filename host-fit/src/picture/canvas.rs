@@ -4,13 +4,16 @@ use std::fmt::Write as _;
 
 use super::palette::{Colour, PAPER};
 
-/// Width of every picture, pixels.
-pub(super) const WIDTH: f64 = 900.0;
+/// Widths in which a picture is laid out, pixels: for half of a desk's screen, and for a phone's. Text has one size, so that it
+/// reads at both.
+const WIDTHS: [f64; 2] = [660.0, 420.0];
 /// Free border around a picture, pixels.
 pub(super) const MARGIN: f64 = 14.0;
 
 /// Width of an average character over the font's size, for a wide sans-serif.
 const CHARACTER: f64 = 0.59;
+/// Width of bold letters relative to plain ones.
+pub(super) const BOLD: f64 = 1.12;
 
 /// Horizontal alignment of a text.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -91,21 +94,58 @@ impl Ink {
     }
 }
 
+/// A picture: one SVG document for wide places and one for narrow ones. As a text it is the wide one.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Picture {
+    wide: String,
+    narrow: String,
+}
+
+impl Picture {
+    /// Both documents for a page, whose style shows the one that fits.
+    #[must_use]
+    pub fn html(&self) -> String {
+        let Self { wide, narrow } = self;
+        format!("<div class=\"wide\">{wide}</div><div class=\"narrow\">{narrow}</div>")
+    }
+}
+
+impl std::ops::Deref for Picture {
+    type Target = str;
+
+    fn deref(&self) -> &str {
+        &self.wide
+    }
+}
+
+impl From<Picture> for String {
+    fn from(picture: Picture) -> Self {
+        picture.wide
+    }
+}
+
 /// The drawing surface: a string, so no operation can fail.
 pub(super) struct Canvas {
+    /// Width of the picture, pixels.
+    pub(super) width: f64,
     elements: String,
 }
 
-/// Draws a picture of width [`WIDTH`]; `paint` returns its height. `description` is the text for screen
-/// readers.
-pub(super) fn draw(description: &str, paint: impl FnOnce(&mut Canvas) -> f64) -> String {
+/// Draws a picture in both widths; `paint` returns its height. `description` is the text for screen readers.
+pub(super) fn draw(description: &str, paint: impl Fn(&mut Canvas) -> f64) -> Picture {
+    let [wide, narrow] = WIDTHS.map(|width| document(description, width, &paint));
+    Picture { wide, narrow }
+}
+
+fn document(description: &str, width: f64, paint: impl Fn(&mut Canvas) -> f64) -> String {
     let mut canvas = Canvas {
+        width,
         elements: String::new(),
     };
     let height = paint(&mut canvas).clamp(1.0, 1e5);
     format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{WIDTH}\" height=\"{height:.0}\" \
-         viewBox=\"0 0 {WIDTH} {height:.0}\" role=\"img\" stroke-linejoin=\"round\" \
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height:.0}\" \
+         viewBox=\"0 0 {width} {height:.0}\" role=\"img\" stroke-linejoin=\"round\" \
          font-family=\"Helvetica, Arial, sans-serif\">\n<title>{}</title>\n\
          <rect width=\"100%\" height=\"100%\" fill=\"{PAPER}\"/>\n{}</svg>\n",
         super::report::escape(description),
@@ -114,6 +154,11 @@ pub(super) fn draw(description: &str, paint: impl FnOnce(&mut Canvas) -> f64) ->
 }
 
 impl Canvas {
+    /// Whether it is laid out for a phone: what stands side by side elsewhere stands below each other.
+    pub(super) fn is_narrow(&self) -> bool {
+        self.width < 500.0
+    }
+
     fn write(&mut self, element: std::fmt::Arguments<'_>) {
         // Writing to a string cannot fail.
         let _ = self.elements.write_fmt(element);

@@ -1,7 +1,7 @@
 //! A closed-loop run: output and reference, commands, air used.
 
 use super::axis::{Axis, extent};
-use super::canvas::{Ink, MARGIN, WIDTH, draw};
+use super::canvas::{Ink, MARGIN, Picture, draw};
 use super::legend::{Swatch, heading, nothing};
 use super::overlay::{named, part, union};
 use super::palette::{INK, series};
@@ -42,7 +42,7 @@ pub struct ClosedLoop<'a> {
 
 /// Draws closed-loop runs over each other, one strip of commands per run. Returns SVG.
 #[must_use]
-pub fn closed_loop(plot: &ClosedLoop<'_>) -> String {
+pub fn closed_loop(plot: &ClosedLoop<'_>) -> Picture {
     let description = format!("{}: closed-loop run", plot.title);
     draw(&description, |canvas| {
         let clock = Clock::new(0.0, plot.sample_period_s);
@@ -77,7 +77,7 @@ pub fn closed_loop(plot: &ClosedLoop<'_>) -> String {
         let main = Panel {
             left,
             top,
-            width: WIDTH - left - MARGIN - 12.0,
+            width: canvas.width - left - MARGIN - 12.0,
             height: 280.0,
             x: clock.axis(&range),
             y,

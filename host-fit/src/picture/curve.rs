@@ -1,7 +1,7 @@
 //! A curve with its confidence band: a term as a function of its coordinate.
 
 use super::axis::{Axis, extent};
-use super::canvas::{Ink, MARGIN, WIDTH, draw};
+use super::canvas::{Ink, MARGIN, Picture, draw};
 use super::legend::{Swatch, heading, nothing};
 use super::palette::{BLUE, INK, MUTED};
 use super::panel::{FOOT, Panel, left_edge};
@@ -41,7 +41,7 @@ const MOST_POINTS: usize = 400;
 
 /// Draws a curve with its confidence band, and its formula. Returns SVG.
 #[must_use]
-pub fn curve(plot: &CurvePlot<'_>) -> String {
+pub fn curve(plot: &CurvePlot<'_>) -> Picture {
     let description = format!("{}: {} against {}", plot.title, plot.y_label, plot.x_label);
     draw(&description, |canvas| {
         // More points make no visible difference.
@@ -72,7 +72,7 @@ pub fn curve(plot: &CurvePlot<'_>) -> String {
         let panel = Panel {
             left,
             top,
-            width: WIDTH - left - MARGIN - 12.0,
+            width: canvas.width - left - MARGIN - 12.0,
             height: 280.0,
             x: Axis::padded(x, 0.03),
             y,

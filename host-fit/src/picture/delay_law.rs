@@ -1,7 +1,7 @@
 //! Measured input delays against the averaged output, and the law fitted to them (the paper's Fig. 8).
 
 use super::axis::{Axis, extent};
-use super::canvas::{Ink, MARGIN, WIDTH, draw};
+use super::canvas::{Ink, MARGIN, Picture, draw};
 use super::legend::{Swatch, heading, nothing};
 use super::overlay::{named, union};
 use super::palette::{BLUE, INK, MUTED, VERMILLION};
@@ -59,7 +59,7 @@ pub struct DelayLawPlot<'a> {
 
 /// Draws measured delays and the fitted law with its confidence band. Returns SVG.
 #[must_use]
-pub fn delay_law(plot: &DelayLawPlot<'_>) -> String {
+pub fn delay_law(plot: &DelayLawPlot<'_>) -> Picture {
     let description = format!("{}: measured input delays and the fitted law", plot.title);
     draw(&description, |canvas| {
         let thin = plot.law.len().div_ceil(400).max(1);
@@ -101,7 +101,7 @@ pub fn delay_law(plot: &DelayLawPlot<'_>) -> String {
         let panel = Panel {
             left,
             top,
-            width: WIDTH - left - MARGIN - 12.0,
+            width: canvas.width - left - MARGIN - 12.0,
             height: 330.0,
             x: Axis::padded(x, 0.03),
             y: y_axis,

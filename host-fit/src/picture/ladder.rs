@@ -1,7 +1,7 @@
 //! The ladder: validation error falling, effect by effect, to the noise level.
 
 use super::axis::{Axis, extent};
-use super::canvas::{Anchor, Canvas, Ink, MARGIN, WIDTH, Words, draw, text_width, wrap};
+use super::canvas::{Anchor, Canvas, Ink, MARGIN, Picture, Words, draw, text_width, wrap};
 use super::legend::{Swatch, heading, nothing};
 use super::palette::{BLUE, Colour, FLOOR, INK, MUTED, PAPER, VERMILLION, series};
 use super::panel::{LABEL_SIZE, Panel, TICK_SIZE, left_edge};
@@ -43,7 +43,7 @@ const HEIGHT: f64 = 300.0;
 
 /// Draws the validation error step by step against the noise level. Returns SVG.
 #[must_use]
-pub fn ladder(plot: &Ladder<'_>) -> String {
+pub fn ladder(plot: &Ladder<'_>) -> Picture {
     let description = format!("{}: validation error step by step", plot.title);
     draw(&description, |canvas| {
         let noise = plot.noise_rmse.filter(|n| n.is_finite() && *n > 0.0);
@@ -73,7 +73,7 @@ pub fn ladder(plot: &Ladder<'_>) -> String {
         let panel = Panel {
             left,
             top,
-            width: WIDTH - left - MARGIN - 12.0,
+            width: canvas.width - left - MARGIN - 12.0,
             height: HEIGHT,
             x: Axis::linear(Some((0.0, plot.steps.len() as f64))),
             y,

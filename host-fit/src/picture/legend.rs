@@ -1,6 +1,6 @@
 //! Titles and legends, placed above the data.
 
-use super::canvas::{Canvas, Ink, MARGIN, WIDTH, Words, fit, text_width};
+use super::canvas::{BOLD, Canvas, Ink, MARGIN, Words, text_width, wrap};
 use super::palette::{Colour, INK, MUTED};
 
 /// Size of legend text, pixels.
@@ -25,22 +25,29 @@ pub(super) fn heading(canvas: &mut Canvas, title: &str, entries: &[(Swatch, Stri
     let mut top = MARGIN;
     if !title.is_empty() {
         let words = Words::new(18.0, INK).bold();
-        let title = fit(title, 18.5, WIDTH - 2.0 * MARGIN);
-        canvas.text(words, (MARGIN, top + 9.0), &title);
-        top += 28.0;
+        for line in wrap(title, BOLD * 18.0, canvas.width - 2.0 * MARGIN, 3) {
+            canvas.text(words, (MARGIN, top + 9.0), &line);
+            top += 23.0;
+        }
+        top += 5.0;
     }
     let mut left = MARGIN;
     let mut drawn = false;
     for (swatch, name) in entries {
-        let name = fit(name, SIZE, WIDTH - 2.0 * MARGIN - SWATCH - 8.0);
-        let width = SWATCH + 8.0 + text_width(&name, SIZE);
-        if left > MARGIN && left + width > WIDTH - MARGIN {
+        let lines = wrap(name, SIZE, canvas.width - 2.0 * MARGIN - SWATCH - 8.0, 3);
+        let widths = lines.iter().map(|line| text_width(line, SIZE));
+        let width = SWATCH + 8.0 + widths.fold(0.0, f64::max);
+        if left > MARGIN && left + width > canvas.width - MARGIN {
             left = MARGIN;
             top += ROW;
         }
         let middle = top + ROW / 2.0;
         sample(canvas, *swatch, left, middle);
-        canvas.text(Words::new(SIZE, INK), (left + SWATCH + 8.0, middle), &name);
+        for (row, line) in lines.iter().enumerate() {
+            let at = (left + SWATCH + 8.0, middle + 17.0 * row as f64);
+            canvas.text(Words::new(SIZE, INK), at, line);
+        }
+        top += 17.0 * (lines.len() - 1) as f64;
         left += width + GAP;
         drawn = true;
     }

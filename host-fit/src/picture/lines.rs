@@ -1,7 +1,7 @@
 //! Several curves over one coordinate: correlations, spectra, step responses.
 
 use super::axis::{Axis, extent};
-use super::canvas::{Ink, MARGIN, WIDTH, draw};
+use super::canvas::{Ink, MARGIN, Picture, draw};
 use super::legend::{Swatch, heading, nothing};
 use super::palette::{FLOOR, INK, MUTED, series};
 use super::panel::{FOOT, Panel, left_edge};
@@ -41,7 +41,7 @@ const MOST_POINTS: usize = 600;
 
 /// Draws curves over one coordinate, with a band about zero. Returns SVG.
 #[must_use]
-pub fn lines(plot: &LinePlot<'_>) -> String {
+pub fn lines(plot: &LinePlot<'_>) -> Picture {
     let description = format!("{}: {} against {}", plot.title, plot.y_label, plot.x_label);
     draw(&description, |canvas| {
         let place = |x: f64| if plot.log_x { x.log10() } else { x };
@@ -84,7 +84,7 @@ pub fn lines(plot: &LinePlot<'_>) -> String {
         let panel = Panel {
             left,
             top,
-            width: WIDTH - left - MARGIN - 12.0,
+            width: canvas.width - left - MARGIN - 12.0,
             height: 260.0,
             x: if plot.log_x {
                 Axis::decades(x)

@@ -28,6 +28,7 @@ mod report;
 mod strip;
 mod where_it_fails;
 
+pub use canvas::Picture;
 pub use closed_loop::{ClosedLoop, LoopRun, closed_loop};
 pub use curve::{BandPoint, CurvePlot, curve};
 pub use delay_law::{DelayEdge, DelayLawPlot, LawPoint, MeasuredDelay, delay_law};

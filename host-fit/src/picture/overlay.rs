@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::axis::{Axis, extent};
-use super::canvas::{Ink, MARGIN, WIDTH, draw};
+use super::canvas::{Ink, MARGIN, Picture, draw};
 use super::legend::{Swatch, heading, nothing};
 use super::palette::{FLOOR, INK, MUTED, series};
 use super::panel::{Clock, FOOT, Panel, left_edge};
@@ -54,7 +54,7 @@ const RESIDUAL: f64 = 120.0;
 /// The scale follows the measurement; a model that leaves it by more than the range of
 /// the data runs along the edge of the panel.
 #[must_use]
-pub fn overlay(plot: &Overlay<'_>) -> String {
+pub fn overlay(plot: &Overlay<'_>) -> Picture {
     let description = format!("{}: measured output and model", plot.title);
     draw(&description, |canvas| {
         let clock = Clock::new(plot.t0_s, plot.sample_period_s);
@@ -118,7 +118,7 @@ pub fn overlay(plot: &Overlay<'_>) -> String {
         let main = Panel {
             left,
             top,
-            width: WIDTH - left - MARGIN - 12.0,
+            width: canvas.width - left - MARGIN - 12.0,
             height: MAIN,
             x: clock.axis(&range),
             y: y_axis,

@@ -140,9 +140,16 @@ impl Panel {
                 &label,
             );
         }
+        // A label that is longer than its axis stays within the picture.
+        let need = text_width(x_label, LABEL_SIZE);
+        let room = canvas.width - 8.0;
+        let size = LABEL_SIZE * (room / need.max(1.0)).min(1.0);
+        let half = 0.5 * need.min(room);
+        let middle = self.left + self.width / 2.0;
+        let middle = middle.min(canvas.width - 4.0 - half).max(4.0 + half);
         canvas.text(
-            Words::new(LABEL_SIZE, INK).at(Anchor::Middle),
-            (self.left + self.width / 2.0, self.bottom() + 36.0),
+            Words::new(size, INK).at(Anchor::Middle),
+            (middle, self.bottom() + 36.0),
             x_label,
         );
     }

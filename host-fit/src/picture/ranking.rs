@@ -1,10 +1,10 @@
 //! Candidate effects ranked by validation error.
 
 use super::axis::{Axis, extent};
-use super::canvas::{Anchor, Ink, MARGIN, WIDTH, Words, draw, fit, text_width};
+use super::canvas::{Anchor, BOLD, Ink, MARGIN, Picture, Words, draw, fit, text_width};
 use super::legend::{Swatch, heading, nothing};
 use super::overlay::union;
-use super::palette::{BLUE, GRID, INK, MUTED, VERMILLION};
+use super::palette::{BLUE, GRID, INK, MUTED, PAPER, VERMILLION};
 use super::panel::{FOOT, Panel};
 use crate::order;
 
@@ -41,16 +41,16 @@ pub struct Ranking<'a> {
 }
 
 const ROW: f64 = 25.0;
+/// Height of a row whose name stands above its dot.
+const STACKED: f64 = 46.0;
 const SIZE: f64 = 14.5;
-/// Width of bold letters relative to plain ones.
-const BOLD: f64 = 1.12;
 /// Largest number of rows; the worst candidates are left out.
 const MOST: usize = 60;
 
 /// Draws candidates as dots with intervals, the best on top, between the noise level and
 /// the model without an effect. Returns SVG.
 #[must_use]
-pub fn ranking(plot: &Ranking<'_>) -> String {
+pub fn ranking(plot: &Ranking<'_>) -> Picture {
     let description = format!("{}: candidate effects by validation error", plot.title);
     draw(&description, |canvas| {
         let mut order: Vec<&Candidate<'_>> = plot.candidates.iter().collect();
@@ -90,30 +90,33 @@ pub fn ranking(plot: &Ranking<'_>) -> String {
             }
             (all, _) => all,
         };
-        let left = order
+        let stacked = canvas.is_narrow();
+        let names = order
             .iter()
             // Any of them may be bold.
             .map(|c| BOLD * text_width(c.name, SIZE))
-            .fold(60.0, f64::max)
-            .min(320.0)
-            + MARGIN
-            + 12.0;
-        let right = order
+            .fold(60.0, f64::max);
+        let notes = order
             .iter()
             .map(|c| text_width(c.note, SIZE - 1.0))
             .fold(0.0, f64::max)
             .min(200.0);
+        let (left, right, pitch) = match stacked {
+            true => (MARGIN, 0.0, STACKED),
+            false => (names.min(0.36 * canvas.width) + MARGIN + 12.0, notes, ROW),
+        };
         let panel = Panel {
             left,
             top,
-            width: WIDTH - left - right - MARGIN - 24.0,
-            height: ROW * order.len() as f64 + 8.0,
+            width: canvas.width - left - right - MARGIN - 24.0,
+            height: pitch * order.len() as f64 + 8.0,
             x: Axis::padded(shown, 0.05),
             y: Axis::linear(None),
         };
         panel.uprights(canvas);
         let rows = || order.iter().enumerate();
-        let middle = |row: usize| panel.top + 4.0 + ROW * (row as f64 + 0.5);
+        // Where names stand above, dots have the lower half of their row.
+        let middle = |row: usize| panel.top + 4.0 + pitch * (row as f64 + 1.0) - 0.5 * ROW;
         for (row, _) in rows() {
             let ends = [panel.left, panel.left + panel.width].map(|x| (x, middle(row)));
             canvas.line(&ends, Ink::new(GRID, 1.0));
@@ -149,11 +152,30 @@ pub fn ranking(plot: &Ranking<'_>) -> String {
             } else {
                 name
             };
-            let text = fit(candidate.name, SIZE, left - MARGIN - 12.0);
-            canvas.text(name.at(Anchor::End), (panel.left - 12.0, middle), &text);
-            let note = fit(candidate.note, SIZE - 1.0, right);
-            let at = (panel.left + panel.width + 12.0, middle);
-            canvas.text(Words::new(SIZE - 1.0, MUTED), at, &note);
+            let quiet = Words::new(SIZE - 1.0, MUTED);
+            if stacked {
+                let above = middle - 0.5 * STACKED;
+                let note = fit(candidate.note, SIZE - 1.0, notes);
+                let room = panel.width - text_width(&note, SIZE - 1.0) - 10.0;
+                let text = fit(candidate.name, SIZE, room);
+                // Lines of the panel pass behind words.
+                let width = BOLD * text_width(&text, SIZE) + 4.0;
+                let right = panel.left + panel.width;
+                let note_from = right - text_width(&note, SIZE - 1.0) - 4.0;
+                for (from, to) in [(panel.left, panel.left + width), (note_from, right)] {
+                    let (low, high) = (above - 9.0, above + 9.0);
+                    canvas.rectangle((from, low), (to, high), Ink::new(PAPER, 1.0));
+                }
+                canvas.text(name, (panel.left, above), &text);
+                let right = (panel.left + panel.width, above);
+                canvas.text(quiet.at(Anchor::End), right, &note);
+            } else {
+                let text = fit(candidate.name, SIZE, left - MARGIN - 12.0);
+                canvas.text(name.at(Anchor::End), (panel.left - 12.0, middle), &text);
+                let note = fit(candidate.note, SIZE - 1.0, right);
+                let at = (panel.left + panel.width + 12.0, middle);
+                canvas.text(quiet, at, &note);
+            }
         }
         let unit = match plot.y_unit {
             "" => String::new(),

@@ -1,7 +1,7 @@
 //! Regions around a point, side by side, for pairs of model errors.
 
 use super::axis::{Axis, extent};
-use super::canvas::{Ink, MARGIN, WIDTH, draw};
+use super::canvas::{Ink, MARGIN, Picture, draw};
 use super::legend::{Swatch, heading, nothing};
 use super::palette::{BLUE, INK};
 use super::panel::{FOOT, Panel, left_edge};
@@ -32,7 +32,7 @@ pub struct Regions<'a> {
 
 /// Draws each region with its contour. Returns SVG.
 #[must_use]
-pub fn regions(plot: &Regions<'_>) -> String {
+pub fn regions(plot: &Regions<'_>) -> Picture {
     draw(plot.title, |canvas| {
         if plot.regions.is_empty() {
             return nothing(canvas, plot.title, "There is no region.");
@@ -42,7 +42,12 @@ pub fn regions(plot: &Regions<'_>) -> String {
             (Swatch::Dot(INK), plot.centre.to_owned()),
         ];
         let top = heading(canvas, plot.title, &entries);
-        let each = (WIDTH - MARGIN) / plot.regions.len() as f64;
+        let columns = if canvas.is_narrow() {
+            1
+        } else {
+            plot.regions.len()
+        };
+        let each = (canvas.width - MARGIN) / columns as f64;
         let mut bottom = top;
         for (index, region) in plot.regions.iter().enumerate() {
             let axis = |i: usize| {
@@ -52,8 +57,8 @@ pub fn regions(plot: &Regions<'_>) -> String {
             let y = axis(1);
             let left = left_edge([&y]);
             let panel = Panel {
-                left: each * index as f64 + left,
-                top,
+                left: each * (index % columns) as f64 + left,
+                top: top + (220.0 + FOOT) * (index / columns) as f64,
                 width: each - left - MARGIN,
                 height: 220.0,
                 x: axis(0),

@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use super::canvas::Picture;
 use super::format::with_minus;
 use super::living::{self, Bundle, Living};
 use super::palette;
@@ -219,10 +220,11 @@ impl Report {
         columns: &[Column<'_>],
         rows: &[Vec<S>],
     ) -> &mut Self {
-        self.push(format_args!("<div class=\"table\"><table>"));
+        // Not within the table, which may be wider than a phone: a caption is not scrolled to be read.
         if !caption.is_empty() {
-            self.push(format_args!("<caption>{}</caption>", inline(caption)));
+            self.push(format_args!("<p class=\"caption\">{}</p>", inline(caption)));
         }
+        self.push(format_args!("<div class=\"table\"><table>"));
         self.push(format_args!("<thead><tr>"));
         for column in columns {
             match column {
@@ -252,15 +254,9 @@ impl Report {
         self.push(format_args!("</tbody></table></div>\n"))
     }
 
-    /// A picture made by this module, with a caption (empty for none). Text that is not
-    /// an SVG document is shown as text.
-    pub fn figure(&mut self, svg: &str, caption: &str) -> &mut Self {
-        if !svg.trim_start().starts_with("<svg") {
-            return self.code(svg);
-        }
-        self.push(format_args!(
-            "<figure><div class=\"pan\" tabindex=\"0\">{svg}</div>"
-        ));
+    /// A picture with a caption (empty for none).
+    pub fn figure(&mut self, picture: &Picture, caption: &str) -> &mut Self {
+        self.push(format_args!("<figure>{}", picture.html()));
         if !caption.is_empty() {
             self.push(format_args!("<figcaption>{}</figcaption>", inline(caption)));
         }
@@ -281,10 +277,10 @@ impl Report {
     }
 
     /// As [`Report::figure`], for a picture whose bars mark their samples in the records of the following group.
-    pub fn bars(&mut self, svg: &str, caption: &str) -> &mut Self {
+    pub fn bars(&mut self, picture: &Picture, caption: &str) -> &mut Self {
         let group = self.groups + 1;
         let at = self.body.len();
-        self.figure(svg, caption);
+        self.figure(picture, caption);
         if let Some(figure) = self.body.get(at..).filter(|f| f.starts_with("<figure>")) {
             let marked =
                 figure.replacen("<figure>", &format!("<figure data-group=\"g{group}\">"), 1);
@@ -301,7 +297,11 @@ impl Report {
 
     /// A line at the foot of the page: tool version, data hash, seed, command.
     pub fn provenance(&mut self, name: &str, value: &str) -> &mut Self {
-        self.provenance.push((name.to_owned(), value.to_owned()));
+        let line = (name.to_owned(), value.to_owned());
+        // Parts of one page often share them.
+        if !self.provenance.contains(&line) {
+            self.provenance.push(line);
+        }
         self
     }
 
@@ -465,19 +465,23 @@ section{scroll-margin-top:8px}\
 .numbers dd.note{font-size:.85rem;font-weight:400;color:var(--muted)}\
 .table{overflow-x:auto;margin:14px 0}\
 table{border-collapse:collapse;font-size:.94rem;font-variant-numeric:tabular-nums}\
-caption{text-align:left;color:var(--muted);padding-bottom:.4em}\
+.caption{color:var(--muted);font-size:.94rem;margin-bottom:0}\
 th,td{padding:5px 14px 5px 0;text-align:left;border-bottom:1px solid var(--rule);vertical-align:top}\
 th{font-weight:600;border-bottom-width:2px}\
+td:first-child{min-width:9em}td:last-child:not(.n){min-width:12em}th.n{white-space:normal!important;min-width:3.2em}\
 .n{text-align:right;padding:5px 8px 5px 14px;white-space:nowrap}\
 figure{margin:18px 0}\
-figure svg{display:block;width:100%;max-width:1100px;height:auto}\
+figure{container-type:inline-size}\
+figure svg{display:block;width:100%;max-width:820px;height:auto}\
+.narrow{display:none}\
+@container (max-width:500px){.wide{display:none}.narrow{display:block}}\
 figcaption{color:var(--muted);font-size:.92rem;max-width:48em;margin-top:4px}\
 footer{margin-top:3em;border-top:1px solid var(--rule);padding-top:10px;color:var(--muted);font-size:.85rem}\
 footer dl{display:grid;grid-template-columns:max-content 1fr;gap:2px 14px;margin:0}\
 footer dd{margin:0;overflow-wrap:anywhere}\
-@media(max-width:600px){main{padding:16px 12px 40px}.pan{overflow-x:auto}.pan svg{width:640px;max-width:none}\
+@media(max-width:600px){main{padding:16px 12px 40px}\
 .verdict{padding:10px 12px}.verdict dl{display:block}.verdict dd{margin:0 0 .5em}}\
-@media print{main,.report{max-width:none;padding:0}.listed,.columns{display:block}.fold>summary{border:0;padding:0}body{font-size:11pt}nav{display:none}\
+@media print{main,.report{max-width:none;padding:0}.listed{display:block}.columns{grid-template-columns:1fr 1fr}figure svg{max-width:600px}.fold>summary{border:0;padding:0}body{font-size:11pt}nav{display:none}\
 figure,.verdict,.numbers,tr{break-inside:avoid}h2,h3{break-after:avoid}.table,pre{overflow:visible}pre{white-space:pre-wrap}}\
 ";
 
@@ -492,6 +496,7 @@ const DARK: &str = "\
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::picture::canvas::draw;
 
     fn sample() -> String {
         let mut report = Report::new("A <b> & \"c\"", "of `data.csv`");
@@ -516,9 +521,8 @@ mod tests {
                 &[Column::Text("a<"), Column::Number("b")],
                 &[vec!["<i>"], vec!["x", "1", "dropped"]],
             )
-            .figure("<svg xmlns=\"http://www.w3.org/2000/svg\"/>", "c & d")
-            .figure("<script>alert(1)</script>", "")
-            .code("if a < b {}")
+            .figure(&draw("d", |_| 30.0), "c & d")
+            .code("if a < b {} <script>alert(1)</script>")
             .list(&["p", "<q>"])
             .provenance("seed", "<1>");
         for heading in ["Two", "Three", "Four"] {

@@ -1,12 +1,12 @@
 //! Helpers for the tests of all pictures.
 
-/// Asserts that `svg` is one well-formed picture of the common width, smaller than 300 kB, that loads nothing from
+/// Asserts that `svg` is one well-formed picture of the wide layout, smaller than 300 kB, that loads nothing from
 /// the network and has only finite coordinates.
 pub(super) fn check(svg: &str) {
     let document = roxmltree::Document::parse(svg).expect("well-formed XML");
     let root = document.root_element();
     assert_eq!(root.tag_name().name(), "svg");
-    assert_eq!(root.attribute("width"), Some("900"));
+    assert_eq!(root.attribute("width"), Some("660"));
     let height: f64 = root.attribute("height").unwrap().parse().unwrap();
     assert!((20.0..4000.0).contains(&height), "height {height}");
     assert!(svg.len() < 300_000, "{} bytes", svg.len());

@@ -1,7 +1,7 @@
 //! Where a model fails: the size of the residual along one coordinate after another.
 
 use super::axis::{Axis, extent};
-use super::canvas::{Anchor, Canvas, Ink, MARGIN, WIDTH, Words, draw, fit, text_width};
+use super::canvas::{Anchor, BOLD, Canvas, Ink, MARGIN, Picture, Words, draw, fit, text_width};
 use super::format::fixed;
 use super::legend::{Swatch, heading, nothing};
 use super::overlay::named;
@@ -47,15 +47,15 @@ pub struct WhereItFails<'a> {
 
 /// Explained share below which no bin is marked.
 const WORTH_MARKING: f64 = 0.05;
-const COLUMNS: usize = 2;
 const PANEL: f64 = 118.0;
-const HEAD: f64 = 30.0;
+/// Name of the coordinate, and below it its share.
+const HEAD: f64 = 48.0;
 const TICKS: f64 = 26.0;
 
 /// Draws one small panel per coordinate on a common scale, with the noise level and the
 /// bin that stands out most above it. Returns SVG.
 #[must_use]
-pub fn where_it_fails(plot: &WhereItFails<'_>) -> String {
+pub fn where_it_fails(plot: &WhereItFails<'_>) -> Picture {
     let description = format!("{}: residual along each coordinate", plot.title);
     draw(&description, |canvas| {
         let bins = || plot.views.iter().flat_map(|v| v.bins);
@@ -74,12 +74,14 @@ pub fn where_it_fails(plot: &WhereItFails<'_>) -> String {
         let y = Axis::linear(Some((0.0, upper)));
         let left = left_edge([&y]);
         let gap = left - 22.0;
+        let columns = if canvas.is_narrow() { 1 } else { 2 };
         // The last label of a panel reaches beyond its edge.
-        let width = (WIDTH - left - MARGIN - 10.0 - gap) / COLUMNS as f64;
+        let width =
+            (canvas.width - left - MARGIN - 10.0 - gap * (columns - 1) as f64) / columns as f64;
         let mut bottom = top;
         for (index, view) in plot.views.iter().enumerate() {
-            let row = (index / COLUMNS) as f64;
-            let column = (index % COLUMNS) as f64;
+            let row = (index / columns) as f64;
+            let column = (index % columns) as f64;
             let panel = Panel {
                 left: left + column * (width + gap),
                 top: top + row * (HEAD + PANEL + TICKS + 12.0) + HEAD,
@@ -93,7 +95,7 @@ pub fn where_it_fails(plot: &WhereItFails<'_>) -> String {
                 &panel,
                 index,
                 view,
-                if index % COLUMNS == 0 {
+                if index % columns == 0 {
                     named(plot.y_label, "RMS residual")
                 } else {
                     ""
@@ -149,31 +151,31 @@ fn small(canvas: &mut Canvas, panel: &Panel, index: usize, view: &FailureView<'_
 
 /// Name, unit and explained share above a panel.
 fn title(canvas: &mut Canvas, panel: &Panel, view: &FailureView<'_>) {
-    let at = panel.top - 14.0;
-    let mut room = panel.width;
+    let at = panel.top - 32.0;
     if let Some(share) = view.explained_fraction.filter(|s| s.is_finite()) {
         let percent = (100.0 * share).round();
         let text = if percent >= 1.0 {
             format!("explains {} %", fixed(percent.min(100.0), 0, false))
         } else {
-            "explains nothing".to_owned()
+            "explains 0 %".to_owned()
         };
         let colour = if share >= 0.2 { VERMILLION } else { MUTED };
-        let right = (panel.left + panel.width, at);
-        canvas.text(Words::new(13.5, colour).at(Anchor::End), right, &text);
-        room -= text_width(&text, 13.5) + 10.0;
+        let below = (panel.left, panel.top - 13.0);
+        canvas.text(Words::new(13.5, colour), below, &text);
     }
     let name = match view.unit {
         "" => view.coordinate.clone(),
         unit => format!("{} ({unit})", view.coordinate),
     };
-    let name = fit(&name, 14.5, room);
-    canvas.text(Words::new(14.5, INK).bold(), (panel.left, at), &name);
+    let need = BOLD * text_width(&name, 14.5);
+    let size = 14.5 * (panel.width / need).clamp(0.75, 1.0);
+    let name = fit(&name, BOLD * size, panel.width);
+    canvas.text(Words::new(size, INK).bold(), (panel.left, at), &name);
 }
 
 /// Bin limits below a panel, as many as fit; a bin of one value has its label in the middle.
 fn edges(canvas: &mut Canvas, panel: &Panel, bins: &[FailureBin], slot: f64) {
-    const SIZE: f64 = 12.5;
+    const SIZE: f64 = 13.0;
     let single = bins.iter().all(|b| b.from == b.to);
     let offset = if single { 0.5 } else { 0.0 };
     let limits: Vec<(f64, f64)> = bins

@@ -7,8 +7,10 @@ export class Bars {
   constructor(group, payload, view) {
     this.payload = payload;
     this.view = view;
-    /** @type {Map<string, SVGElement>} */
+    /** A picture is there in two layouts, of which one is seen. @type {Map<string, SVGElement[]>} */
     this.bars = new Map();
+    /** Bars of the sample that is read, per coordinate. @type {(SVGElement[] | undefined)[]} */
+    this.marked = [];
     const figures = document.querySelectorAll(`figure[data-group="${group}"] [data-bar]`);
     for (const bar of /** @type {NodeListOf<SVGElement>} */ (figures)) {
       const [coordinate, bin] = (bar.dataset.bar ?? "").split(":").map(Number);
@@ -18,11 +20,15 @@ export class Bars {
         bar.setAttribute("role", "img");
         continue;
       }
-      this.bars.set(`${coordinate}:${bin}`, bar);
+      const key = `${coordinate}:${bin}`;
+      this.bars.set(key, [...(this.bars.get(key) ?? []), bar]);
       bar.classList.add("bar");
       // One stop of the tab key for each panel; the arrows go along it.
-      bar.setAttribute("tabindex", this.bars.has(`${coordinate}:first`) ? "-1" : "0");
-      if (!this.bars.has(`${coordinate}:first`)) this.bars.set(`${coordinate}:first`, bar);
+      const panel = `${coordinate}:first`;
+      const first = this.bars.get(panel) ?? [];
+      const later = first.some((other) => other.ownerSVGElement === bar.ownerSVGElement);
+      bar.setAttribute("tabindex", later ? "-1" : "0");
+      if (!later) this.bars.set(panel, [...first, bar]);
       // A picture's parts cannot be pressed; those of a group can.
       bar.closest("svg")?.setAttribute("role", "group");
       bar.setAttribute("role", "button");
@@ -35,7 +41,7 @@ export class Bars {
       bar.addEventListener("keydown", (event) => {
         const along = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
         if (event.key === "Enter" || event.key === " ") toggle();
-        else if (along) this.bars.get(`${coordinate}:${bin + along}`)?.focus();
+        else if (along) this.bars.get(`${coordinate}:${bin + along}`)?.forEach((other) => other.focus());
         else if (event.key === "Escape") view.light(null);
         else return;
         event.preventDefault();
@@ -53,11 +59,13 @@ export class Bars {
 
   show() {
     const { lit } = this.view;
-    for (const [key, bar] of this.bars) {
+    for (const [key, bars] of this.bars) {
       if (key.endsWith("first")) continue;
       const on = lit !== null && key === `${lit.coordinate}:${lit.bin}`;
-      bar.classList.toggle("lit", on);
-      bar.setAttribute("aria-pressed", String(on));
+      for (const bar of bars) {
+        bar.classList.toggle("lit", on);
+        bar.setAttribute("aria-pressed", String(on));
+      }
     }
   }
 
@@ -67,12 +75,11 @@ export class Bars {
       const places = at && coordinate.places[at.record];
       const bin = places ? binAt(places, at.sample) : -1;
       const now = bin < 0 ? undefined : this.bars.get(`${index}:${bin}`);
-      const before = this.marked?.[index];
+      const before = this.marked[index];
       if (before !== now) {
-        before?.classList.remove("here");
-        now?.classList.add("here");
+        before?.forEach((bar) => bar.classList.remove("here"));
+        now?.forEach((bar) => bar.classList.add("here"));
       }
-      this.marked = this.marked ?? [];
       this.marked[index] = now;
     });
   }

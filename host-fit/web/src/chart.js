@@ -2,7 +2,7 @@
 
 import uPlot from "uplot";
 import { significant, ticks } from "./number.js";
-import { stretches } from "./data.js";
+import { colourOf, stretches } from "./data.js";
 import { Pyramid, grid, outline, places, thinned } from "./thin.js";
 import { figureButtons } from "./save.js";
 
@@ -148,7 +148,7 @@ export class Chart {
     return [
       ...(this.on("measured") ? [{ name: "measured", kind: "measured", colour: "--ink" }] : []),
       ...payload.runs.flatMap((name, i) =>
-        record.runs[i] && this.on(`run${i}`) ? [{ name, kind: `s${i % 6}`, colour: `--s${i % 6}`, dash: DASHES[i % DASHES.length] }] : [],
+        record.runs[i] && this.on(`run${i}`) ? [{ name, kind: `s${colourOf(payload, i)}`, colour: `--s${colourOf(payload, i)}`, dash: DASHES[colourOf(payload, i)] }] : [],
       ),
       ...((record.sd || record.low) && this.on("scatter")
         ? [{ name: repeats ? "range over repeats" : "scatter: ± 2 standard errors or range", kind: "scatter", colour: "--band", band: true }]
@@ -186,7 +186,7 @@ export class Chart {
       low && high && this.on("scatter") ? { low, high } : null;
     const bands = [band(made.low, made.high), band(made.floorLow, made.floorHigh)];
     if (this.on("measured")) main.push({ label: "measured", data: made.y, stroke: colour("--ink"), width: 1.5 });
-    const style = (/** @type {number} */ i) => ({ stroke: colour(`--s${i % 6}`), width: 1.5, dash: DASHES[i % DASHES.length] });
+    const style = (/** @type {number} */ i) => ({ stroke: colour(`--s${colourOf(this.payload, i)}`), width: 1.5, dash: DASHES[colourOf(this.payload, i)] });
     made.runs.forEach((run, i) => {
       if (!run || !this.on(`run${i}`)) return;
       main.push({ label: this.payload.runs[i], data: run, ...style(i) });

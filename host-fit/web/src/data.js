@@ -24,6 +24,7 @@
  * @property {string} label of the axis of y
  * @property {PackedRecord[]} records
  * @property {string[]} runs names of the models
+ * @property {number[]=} colours of the runs; in their order if left out
  * @property {number[]=} off runs that are not shown at first
  * @property {Coordinate[]} coordinates
  * @property {number[]=} view what is in view at first, from and to, s since a record's start
@@ -43,6 +44,9 @@
  * @property {(Float32Array | null)[]} runs
  * @property {(Float32Array | null)[]} residuals y − run
  */
+
+/** The colour of a run, one of six. @param {Payload} payload @param {number} run */
+export const colourOf = (payload, run) => (payload.colours?.[run] ?? run) % 6;
 
 /** @param {string} text @returns {Float32Array} */
 export function floats(text) {

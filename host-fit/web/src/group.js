@@ -2,7 +2,7 @@
 
 import { Bars } from "./bars.js";
 import { Chart } from "./chart.js";
-import { floats, unpack } from "./data.js";
+import { colourOf, floats, unpack } from "./data.js";
 import { significant } from "./number.js";
 import { svgOf } from "./save.js";
 import { View } from "./view.js";
@@ -73,7 +73,7 @@ export class Group {
     const names = [
       ["measured", "measured", "measured"],
       ...(this.payload.records.some((r) => r.sd || r.low) ? [["scatter", "scatter", "scatter"]] : []),
-      ...this.payload.runs.map((name, i) => [`run${i}`, name, `run s${i % 6}`]),
+      ...this.payload.runs.map((name, i) => [`run${i}`, name, `run s${colourOf(this.payload, i)}`]),
       ...(this.payload.runs.length > 0 ? [["residuals", "y − model", "residuals"]] : []),
     ];
     switches.append(...names.map(([key, name, kind]) => this.toggle(key, name, kind)));
@@ -101,7 +101,7 @@ export class Group {
   search(runs) {
     if (!runs) this.searching?.remove();
     else if (!this.searching?.isConnected) {
-      this.searching = this.toggle("search", "best so far", `run s${this.payload.runs.length % 6}`);
+      this.searching = this.toggle("search", "best so far", `run s${colourOf(this.payload, this.payload.runs.length)}`);
       this.switches?.append(this.searching);
     }
     this.charts.forEach((chart, i) => chart.searched(runs && runs[i] ? floats(runs[i]) : null));

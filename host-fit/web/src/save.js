@@ -51,15 +51,19 @@ function buttons(figure) {
 /** For pictures that are SVG on the page. @param {Iterable<Element>} figures */
 export function saveButtons(figures) {
   for (const figure of figures) {
-    const svg = figure.querySelector("svg");
-    if (!svg) continue;
+    const all = [...figure.querySelectorAll("svg")];
+    if (all.length === 0) continue;
     figure.append(
-      buttons(() => ({
-        name: svg.querySelector("title")?.textContent ?? "figure",
-        svg: new XMLSerializer().serializeToString(svg),
-        width: svg.viewBox.baseVal.width,
-        height: svg.viewBox.baseVal.height,
-      })),
+      buttons(() => {
+        // Of the layouts, the one that is seen.
+        const svg = all.find((one) => one.clientWidth > 0) ?? all[0];
+        return {
+          name: svg.querySelector("title")?.textContent ?? "figure",
+          svg: new XMLSerializer().serializeToString(svg),
+          width: svg.viewBox.baseVal.width,
+          height: svg.viewBox.baseVal.height,
+        };
+      }),
     );
   }
 }

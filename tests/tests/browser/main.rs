@@ -38,6 +38,31 @@ fn run(arguments: &[&dyn AsRef<std::ffi::OsStr>]) {
     );
 }
 
+/// Half of the records of the bundled ramp with a hidden effect, which says as much in a fifth of the time.
+fn ramp(folder: &Path) -> PathBuf {
+    let bundled = root().join("data/hidden-ramp");
+    let data = folder.join("ramp");
+    std::fs::create_dir_all(&data).expect("a folder");
+    let mut manifest = "title = \"Half of a ramp\"\nsample_period_s = 0.001\n".to_owned();
+    for (name, role) in RECORDS {
+        let file = format!("{name}.csv");
+        std::fs::copy(bundled.join(&file), data.join(&file)).expect("a record");
+        manifest.push_str(&format!(
+            "[[record]]\nname = \"{name}\"\nfile = \"{file}\"\nuse = \"{role}\"\n"
+        ));
+    }
+    std::fs::write(data.join("dataset.toml"), manifest).expect("a manifest");
+    data
+}
+
+/// The records of [`ramp`].
+const RECORDS: [(&str, &str); 4] = [
+    ("sq4-50", "identify"),
+    ("random-a", "identify"),
+    ("sq8-80", "validate"),
+    ("random-b", "validate"),
+];
+
 /// Evaluates an expression on a page.
 #[track_caller]
 fn act(b: &mut Browser, page: &Page, expression: &str) -> Value {
@@ -88,7 +113,18 @@ fn fits(b: &mut Browser, page: &Page, width: f64) {
     assert!(wide.as_f64() <= Some(width), "{wide} px wide on {width} px");
 }
 
-/// A running workbench; dropping this value kills it without a shutdown.
+/// Words in pictures are at least 11 px high as they are seen, and nothing of them is cut off at the picture's edge.
+#[track_caller]
+fn readable(b: &mut Browser, page: &Page) {
+    let wrong = act(
+        b,
+        page,
+        "[...document.querySelectorAll('figure svg')].filter(s => s.clientWidth > 0).flatMap(s => { const box = s.getBoundingClientRect(), scale = box.width / s.viewBox.baseVal.width; return [...s.querySelectorAll('text')].flatMap(t => { const r = t.getBoundingClientRect(), px = scale * Number(t.getAttribute('font-size')); return px < 11 ? [`${px.toFixed(1)} px: ${t.textContent}`] : r.left < box.left - 1 || r.right > box.right + 1 || t.textContent.endsWith('…') ? [`cut: ${t.textContent}`] : []; }); })",
+    );
+    assert_eq!(wrong, Value::Array(Vec::new()), "{wrong:#}");
+}
+
+/// The workbench, serving; ends with this value, as abruptly as a power cut.
 struct Served {
     child: Child,
     address: String,

@@ -2,7 +2,8 @@
 
 use scenarios::browser::Browser;
 
-use super::{SLOWEST_FRAME, accessible, act, fits, panned, root, run, shoot, until};
+use super::print::keeps_its_curves;
+use super::{SLOWEST_FRAME, accessible, act, fits, panned, readable, root, run, shoot, until};
 
 #[test]
 #[ignore = "needs chromium: cargo xtask browser"]
@@ -12,6 +13,9 @@ fn a_report_is_looked_along() {
     let model = root().join("data/paper/table-2-state-dependent.toml");
     let data = root().join("data/hidden-ramp");
     run(&[&"compare", &model, &data, &"--report", &page_file]);
+    let size = std::fs::metadata(&page_file).expect("the report").len();
+    eprintln!("  a report of 8 records weighs {:.2} MB", size as f64 / 1e6);
+    assert!(size < 5_000_000);
     let address = format!("file://{}", page_file.display());
     let mut b = Browser::start().expect("chromium");
     let page = b.open(&address, (1100, 1000), false).expect("a page");
@@ -132,5 +136,8 @@ fn a_report_is_looked_along() {
     );
     fits(&mut b, &phone, 390.0);
     shoot(&mut b, &phone, "report-phone.png");
+    readable(&mut b, &phone);
+    readable(&mut b, &page);
+    keeps_its_curves(&mut b, &address, 8);
     assert_eq!(b.faults(), Vec::<String>::new());
 }

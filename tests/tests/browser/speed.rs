@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use scenarios::browser::Browser;
 
-use super::{SLOWEST_FRAME, act, panned, root, run, serve, until};
+use super::{SLOWEST_FRAME, act, panned, root, serve, until};
 
 /// A record of a flow that lags behind the valve, with repeatable noise.
 fn record(samples: usize, period: f64) -> String {
@@ -64,7 +64,6 @@ fn long_records_open_and_pan_smoothly() {
     );
 
     // Eight records of 10 000 samples with three models.
-    let data = root().join("data/hidden-ramp");
     let eight = folder.path().join("eight");
     set(&eight, 8, 10_000);
     let project = folder.path().join("models");
@@ -113,18 +112,6 @@ fn long_records_open_and_pan_smoothly() {
     eprintln!("  8 × 10 000 × 3");
     assert!(panned(&mut b, &page) < SLOWEST_FRAME);
 
-    // A report of a comparison, opened from disk.
-    let page_file = folder.path().join("report.html");
-    run(&[
-        &"compare",
-        &root().join("data/paper/table-2-state-dependent.toml"),
-        &data,
-        &"--report",
-        &page_file,
-    ]);
-    let size = std::fs::metadata(&page_file).expect("the report").len();
-    eprintln!("  a report of 8 records weighs {:.2} MB", size as f64 / 1e6);
-    assert!(size < 5_000_000);
     // Within 2 s on an idle machine.
     assert!(opened < 10.0, "600 000 samples took {opened} s");
     assert_eq!(b.faults(), Vec::<String>::new());

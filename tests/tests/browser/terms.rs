@@ -110,14 +110,15 @@ fn a_term_that_no_catalogue_has_is_found_and_taken_as_a_formula() {
         &mut b,
         &page,
         20,
-        "document.querySelector('.model.current').textContent.includes('-by-pulse-number')",
+        "document.querySelectorAll('.model')[1].textContent.includes('-by-pulse-number')",
     );
     steps.done("discovered");
-    // The finding is shown where the search was started.
-    act(
+    // What was found is told where it was looked for: the page stays with its model, and says where the new one is.
+    until(
         &mut b,
         &page,
-        "[...document.querySelectorAll('#models button')].find(x => x.textContent === 'Undo').click()",
+        20,
+        "document.querySelector('.model.current').textContent.startsWith('1.') && document.getElementById('go-on').textContent === 'Go to model 2'",
     );
     until(
         &mut b,

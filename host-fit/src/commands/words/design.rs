@@ -179,13 +179,75 @@ fn likelihood(case: &Case) -> String {
     }
 }
 
-fn case_table(proof: &Proof) -> String {
+/// The interval of the trials that is judged, in words.
+fn judged_interval(proof: &Proof) -> String {
     let period_s = proof.trace.sample_period_s;
     let [from, until] = [RULES.trial_from, RULES.trial]
         .map(|n| 1e-3 * milliseconds(span(n, period_s) as f64, period_s));
+    format!("closed loop, from {from} s to {until} s")
+}
+
+/// Which trials decide.
+const DECIDING: &str = "Cases `model` and `p` (one-sided p-value on the records) decide. Cases `unseen` (excluded by the records, but too small for a diagnosis) and `stress` (outside the records) only warn";
+
+/// Columns of [`trial_rows`]: name, and whether it holds numbers.
+pub(crate) const TRIALS: [(&str, bool); 11] = [
+    ("trial", false),
+    ("likely", false),
+    ("attachment", false),
+    ("mean y", true),
+    ("rms error", true),
+    ("offset", true),
+    ("peak to peak", true),
+    ("switches/s", true),
+    ("air", true),
+    ("settles", true),
+    ("steady blowing", true),
+];
+
+/// What the table of trials shows.
+pub(crate) fn trial_caption(proof: &Proof) -> String {
+    let interval = judged_interval(proof);
+    let mut letters = interval.chars();
+    let first = letters.next().into_iter().flat_map(char::to_uppercase);
+    let sentence: String = first.chain(letters).collect();
+    format!("{sentence}. {DECIDING}.")
+}
+
+/// The trials of a law, the reference run last.
+pub(crate) fn trial_rows(proof: &Proof) -> Vec<Vec<String>> {
+    let row = |name: &str, likely: String, kept: &str, f: &Figures, steady: String| {
+        let mut cells = vec![name.to_owned(), likely, kept.to_owned()];
+        cells.extend([f.mean, f.rms].map(|v| format!("{v:.3}")));
+        cells.push(format!("{:+.3}", f.offset));
+        cells.push(format!("{:.3}", f.peak_to_peak));
+        cells.push(format!("{:.1}", f.switches_per_s));
+        cells.push(format!("{:.3}", f.air));
+        let settling = f.settling_s.map(|s| format!("{s:.2} s"));
+        cells.push(settling.unwrap_or_else(|| "never".to_owned()));
+        cells.push(steady);
+        cells
+    };
+    let cases = proof.cases.iter().map(|case| {
+        let kept = if case.kept { "kept" } else { "LOST" };
+        let steady = format!("{:.3}", case.steady);
+        row(&case.name, likelihood(case), kept, &case.figures, steady)
+    });
+    let compared = judged(&proof.compared);
+    let last = row(
+        proof.compared_name,
+        String::new(),
+        "",
+        &compared,
+        String::new(),
+    );
+    cases.chain([last]).collect()
+}
+
+fn case_table(proof: &Proof) -> String {
     let mut text = format!(
         "{:<44} {:>7} {:>6} {:>6} {:>7} {:>6} {:>6} {:>6} {:>7} {:>6}  attachment",
-        format!("closed loop, from {from} s to {until} s"),
+        judged_interval(proof),
         "likely",
         "mean",
         "rms",
@@ -196,28 +258,29 @@ fn case_table(proof: &Proof) -> String {
         "settle",
         "steady"
     );
-    let mut line = |name: &str, likely: &str, f: &Figures, rest: [&str; 2]| {
-        let settling = f
-            .settling_s
-            .map_or("never".to_owned(), |s| format!("{s:.2} s"));
+    for cells in trial_rows(proof) {
+        let [
+            name,
+            likely,
+            kept,
+            mean,
+            rms,
+            offset,
+            p2p,
+            switches,
+            air,
+            settling,
+            steady,
+        ] = cells.as_slice()
+        else {
+            continue;
+        };
         let name: String = name.chars().take(44).collect();
-        let [steady, kept] = rest;
         text.push_str(&format!(
-            "\n{name:<44} {likely:>7} {:>6.3} {:>6.3} {:>+7.3} {:>6.3} {:>6.1} {:>6.3} {settling:>7} {steady:>6}  {kept}",
-            f.mean, f.rms, f.offset, f.peak_to_peak, f.switches_per_s, f.air
+            "\n{name:<44} {likely:>7} {mean:>6} {rms:>6} {offset:>7} {p2p:>6} {switches:>6} {air:>6} {settling:>7} {steady:>6}  {kept}"
         ));
-    };
-    for case in &proof.cases {
-        let kept = if case.kept { "kept" } else { "LOST" };
-        let steady = format!("{:.3}", case.steady);
-        line(
-            &case.name,
-            &likelihood(case),
-            &case.figures,
-            [&steady, kept],
-        );
     }
-    line(proof.compared_name, "", &judged(&proof.compared), ["", ""]);
-    text.push_str("\nCases `model` and `p` (one-sided p-value on the records) decide. Cases `unseen` (excluded by the records, but too small for a diagnosis) and `stress` (outside the records) only warn");
+    text.push('\n');
+    text.push_str(DECIDING);
     text
 }

@@ -4,6 +4,7 @@ mod delay;
 mod design;
 mod finding;
 
+pub(crate) use design::{TRIALS, trial_caption, trial_rows};
 pub(crate) use finding::{ladder_rows, named_first, ranking_rows};
 
 use std::collections::BTreeMap;

@@ -2,11 +2,13 @@
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
+use host_fit::data::Use;
 use host_fit::indicators::score;
 use host_fit::model::Model;
-use host_fit::picture::{Ladder, LadderStep, ladder, packed, workbench_page};
+use host_fit::picture::{Ladder, LadderStep, Picture, ladder, packed, significant, workbench_page};
 use host_fit::steps::{self, Comparison, ImportedSet};
 use serde_json::{Value, json};
 use workbench::{Bench, Download, Node, Project, Refusal, Work, beneath};
@@ -14,6 +16,10 @@ use workbench::{Bench, Download, Node, Project, Refusal, Work, beneath};
 use super::data::{Data, Uploads};
 use super::own::OwnEffects;
 use super::request::Line;
+use crate::commands::demo::bundled_ramp;
+use crate::commands::page_parts::{
+    POLES, POLES_ARE, Run, check_figures, pole_rows, stretch_figure, worst_stretch,
+};
 use crate::commands::words::{describe, score_rows};
 use crate::commands::{page, paragraph};
 
@@ -28,6 +34,8 @@ pub(super) struct ModelBench {
     compared: Mutex<HashMap<u32, Arc<Compared>>>,
     /// The free run of the best model of a running search: number of evaluations, and y per record.
     best: Mutex<Option<(usize, Vec<Vec<f64>>)>>,
+    /// Whether a step runs: its data set stays.
+    busy: AtomicBool,
 }
 
 /// A model with its free runs, or with the error message if they diverge.
@@ -45,6 +53,9 @@ pub(super) struct Made<'a> {
     pub(super) step: String,
     /// The step as a command.
     pub(super) command: String,
+    /// The model that was current when the step began, if the page is to go on to the new one: it does unless the user has
+    /// gone elsewhere meanwhile.
+    pub(super) leaves: Option<Option<u32>>,
 }
 
 pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
@@ -73,6 +84,7 @@ impl ModelBench {
             data: Mutex::new(data.map(Arc::new)),
             compared: Mutex::default(),
             best: Mutex::default(),
+            busy: AtomicBool::new(false),
         })
     }
 
@@ -96,6 +108,7 @@ impl ModelBench {
                     from: None,
                     step: "added by the user".to_owned(),
                     command: format!("# model {} added by the user", path.display()),
+                    leaves: Some(lock(&self.project).current()),
                 };
                 self.keep(&made).map_err(|why| anyhow::anyhow!(why.0))?;
             }
@@ -111,13 +124,85 @@ impl ModelBench {
 
     /// Makes an imported data set the project's.
     pub(super) fn take(&self, found: &ImportedSet, command: &str) -> Result<(), Refusal> {
-        // Fails if there are models of another data set; checked before anything is written.
-        lock(&self.project).set_data(&found.hash)?;
+        self.change_data(command, |folder| Ok(found.imported.save(folder)?))
+    }
+
+    /// Makes a folder that `save` writes the project's data set. Models of another one are put aside with their data.
+    fn change_data(
+        &self,
+        command: &str,
+        save: impl FnOnce(&Path) -> Result<(), Refusal>,
+    ) -> Result<(), Refusal> {
+        let incoming = beneath(&self.folder, Path::new("incoming"))?;
+        if incoming.exists() {
+            std::fs::remove_dir_all(&incoming)?;
+        }
+        save(&incoming)?;
+        let load = |folder: &Path| Data::load(folder).map_err(|e| Refusal(paragraph(&e)));
+        let hash = load(&incoming)?.set.hash;
+        let earlier = lock(&self.project).start_anew(&hash)?;
+        lock(&self.compared).clear();
         let folder = beneath(&self.folder, Path::new(super::IMPORTED))?;
-        found.imported.save(&folder)?;
-        let data = Data::load(&folder).map_err(|e| Refusal(paragraph(&e)))?;
-        *lock(&self.data) = Some(Arc::new(data));
+        match earlier {
+            Some(earlier) if folder.exists() => {
+                std::fs::rename(&folder, earlier.join(super::IMPORTED))?;
+            }
+            _ if folder.exists() => std::fs::remove_dir_all(&folder)?,
+            _ => {}
+        }
+        std::fs::rename(&incoming, &folder)?;
+        *lock(&self.data) = Some(Arc::new(load(&folder)?));
         Ok(lock(&self.project).note(command)?)
+    }
+
+    /// Makes the bundled recordings the data set.
+    fn bring_bundled(&self) -> Result<Value, Refusal> {
+        self.change_data(
+            "# the bundled recordings: a ramp with a hidden effect",
+            |folder| {
+                std::fs::create_dir_all(folder)?;
+                for (name, text) in bundled_ramp() {
+                    std::fs::write(folder.join(name), text)?;
+                }
+                Ok(())
+            },
+        )?;
+        Ok(json!({}))
+    }
+
+    /// Chooses the validation records; `names` are theirs, one a line.
+    fn validate_on(&self, names: &str) -> Result<Value, Refusal> {
+        let mut set = self.data()?.set.clone();
+        let chosen: Vec<&str> = names.lines().collect();
+        for record in &mut set.records {
+            record.role = match chosen.contains(&record.name.as_str()) {
+                true => Use::Validate,
+                false => Use::Identify,
+            };
+        }
+        if set
+            .records
+            .iter()
+            .all(|record| record.role == Use::Validate)
+        {
+            return Err(Refusal(
+                "a model needs an estimation record: leave one out of the validation records"
+                    .to_owned(),
+            ));
+        }
+        let line = format!("# validation records: {}", chosen.join(", "));
+        self.change_data(&line, |folder| Ok(set.save(folder)?))?;
+        Ok(json!({}))
+    }
+
+    /// Refuses while a step runs.
+    fn idle(&self) -> Result<(), Refusal> {
+        match self.busy.load(Ordering::Relaxed) {
+            true => Err(Refusal(
+                "a step runs on these records: wait for it, or cancel it".to_owned(),
+            )),
+            false => Ok(()),
+        }
     }
 
     /// Writes a model into the project and makes it the current one; returns its number.
@@ -129,6 +214,7 @@ impl ModelBench {
         let file = project.next_file();
         made.model
             .save(&beneath(project.folder(), Path::new(&file))?)?;
+        let before = project.current();
         let id = project.add(Node {
             id: 0,
             parent: made.from,
@@ -139,6 +225,9 @@ impl ModelBench {
             noise_rmse: held_out.and_then(|i| i.noise_rmse),
             fit_percent: held_out.and_then(|i| finite(i.fit_percent)),
         })?;
+        if let Some(stays) = before.filter(|_| made.leaves != Some(before)) {
+            project.select(stays)?;
+        }
         drop(project);
         let compared = Compared {
             model: made.model.clone(),
@@ -205,7 +294,7 @@ impl ModelBench {
     }
 
     /// The validation error from the first model of a branch to this one.
-    fn ladder(&self, id: u32) -> String {
+    fn ladder(&self, id: u32) -> Picture {
         let project = lock(&self.project);
         let mut path = Vec::new();
         let mut at = Some(id);
@@ -239,7 +328,8 @@ impl ModelBench {
             Err(why) => {
                 return json!({
                     "describe": "", "effects": [], "columns": [], "rows": [], "where": [], "where_picture": "",
-                    "ladder_picture": self.ladder(id), "error": why.0,
+                    "ladder_picture": self.ladder(id).html(), "error": why.0, "stretch": [], "checks": [],
+                    "poles": [], "parameters": [],
                 });
             }
         };
@@ -247,22 +337,79 @@ impl ModelBench {
             Ok(run) => (
                 score_rows(&run.scores).into_iter().map(Vec::from).collect(),
                 run.failures.describe(),
-                page::failures_picture(&run.failures),
+                page::failures_picture(&run.failures).html(),
                 None,
             ),
             Err(why) => (Vec::new(), Vec::new(), String::new(), Some(why)),
         };
+        let records = self
+            .data()
+            .map(|data| compared.model.targets(&data.set.records));
+        let records = records.unwrap_or_default();
+        let runs = compared.run.as_ref().map_or(&[][..], |run| &run.runs);
+        let (label, model) = ("model", &compared.model);
+        let tested = [Run { label, model, runs }];
+        let drawn = |(picture, caption): (Picture, String)| json!({"picture": picture.html(), "caption": caption});
+        let checks: Vec<Value> = match compared.run {
+            Ok(_) => check_figures(&records, &tested)
+                .into_iter()
+                .map(drawn)
+                .collect(),
+            Err(_) => Vec::new(),
+        };
+        // Beside the model that it was made from, if both are there.
+        let parent = lock(&self.project)
+            .node(id)
+            .ok()
+            .and_then(|node| node.parent);
+        let before = parent.and_then(|parent| self.compared(parent).ok());
+        let before = before.as_ref().and_then(|before| before.run.as_ref().ok());
+        let mut shown: Vec<(&str, &[Vec<f64>])> = Vec::new();
+        shown.extend(before.map(|before| ("before", before.runs.as_slice())));
+        shown.push((if before.is_some() { "after" } else { "model" }, runs));
+        let worst = shown
+            .first()
+            .and_then(|first| worst_stretch(&records, first.1));
+        let stretch: Vec<Value> = worst
+            .and_then(|worst| stretch_figure(&records, &shown, worst))
+            .into_iter()
+            .map(drawn)
+            .collect();
         json!({
+            "stretch": stretch,
+            "checks": checks,
+            "poles": pole_rows(&tested),
+            "pole_columns": POLES.map(|(name, _)| name),
+            "poles_are": POLES_ARE,
+            "parameters": parameters(&compared.model),
             "describe": describe(&compared.model),
             "effects": compared.model.effect_names(),
             "columns": ["record", "use", "FIT, %", "ρ", "RMSE", "noise", "ε", "inside"],
             "rows": rows,
             "where": words,
             "where_picture": picture,
-            "ladder_picture": self.ladder(id),
+            "ladder_picture": self.ladder(id).html(),
             "error": error,
         })
     }
+}
+
+/// Parameters of the effects of a model: effect, name, value, unit.
+fn parameters(model: &Model) -> Vec<[String; 4]> {
+    let effects = model.effects.iter();
+    let known = effects.filter_map(|added| Some((added, model.spec(&added.name)?)));
+    let each = known.flat_map(|(added, spec)| {
+        let pairs = spec.parameters.iter().zip(&added.parameters);
+        pairs.map(|(parameter, value)| {
+            let unit = match parameter.unit.symbol() {
+                "-" => String::new(),
+                unit => unit.to_owned(),
+            };
+            let name = parameter.name.to_owned();
+            [added.name.clone(), name, significant(*value, 3), unit]
+        })
+    });
+    each.collect()
 }
 
 impl Bench for ModelBench {
@@ -287,6 +434,7 @@ impl Bench for ModelBench {
             "diagnosis": self.kept("diagnosis", current),
             "discovery": self.kept("discovery", current),
             "law": self.kept("law", current),
+            "made": self.kept("made", current),
         })
     }
 
@@ -332,8 +480,10 @@ impl Bench for ModelBench {
             Some(("forget", name)) => self.own.forget(name),
             Some(("inspect", file)) => self.uploads.inspect(file),
             Some(("best", seen)) => Ok(self.best_since(seen)),
+            Some(("bundled", _)) => self.idle().and_then(|()| self.bring_bundled()),
+            Some(("validate", names)) => self.idle().and_then(|()| self.validate_on(names)),
             _ => Err(Refusal(
-                "the key must be one of `check`, `keep`, `forget`, `inspect` and `best`, with a text"
+                "the key must be one of `check`, `keep`, `forget`, `inspect`, `best`, `bundled` and `validate`, with a text"
                     .to_owned(),
             )),
         }
@@ -348,7 +498,11 @@ impl Bench for ModelBench {
     }
 
     fn run(&self, request: &Value, work: &Work) -> Result<(), Refusal> {
-        self.prepare(request)?.run(self, work)
+        let task = self.prepare(request)?;
+        self.busy.store(true, Ordering::Relaxed);
+        let done = task.run(self, work);
+        self.busy.store(false, Ordering::Relaxed);
+        done
     }
 
     fn file(&self, kind: &str, model: u32) -> Result<Download, Refusal> {

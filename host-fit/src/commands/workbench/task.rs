@@ -16,7 +16,7 @@ use super::bench::{Made, ModelBench, lock};
 use super::data::Data;
 use super::request::{Command, Line, Request};
 use crate::commands::paragraph;
-use crate::commands::words::{Words, ranking_rows};
+use crate::commands::words::{TRIALS, Words, ranking_rows, trial_caption, trial_rows};
 use crate::commands::{design, diagnose, discover, drawings, extend, identify, import, page};
 
 /// A task that can be started.
@@ -77,7 +77,8 @@ impl Onlooker for Page<'_> {
         self.work.now(what);
     }
     fn sees(&self, snapshot: &Snapshot) {
-        self.work.best(snapshot.evaluations, snapshot.best);
+        self.work
+            .best(snapshot.evaluations, snapshot.budget, snapshot.best);
         let mut glimpse = lock(&self.glimpse);
         (glimpse.evaluations, glimpse.best) = (snapshot.evaluations, snapshot.best);
     }
@@ -193,6 +194,11 @@ fn loop_of(model: &Path) -> PathBuf {
     model.with_file_name(format!("{}.csv", stem.replace("model", "loop")))
 }
 
+/// Stores what a step says of the model that it made.
+fn told_of(bench: &ModelBench, id: u32, told: &Value) -> Result<(), Refusal> {
+    write(&bench.beside("made", id, "json")?, &told.to_string())
+}
+
 fn write(path: &Path, text: &str) -> Result<(), Refusal> {
     Ok(write_atomic(path, |out| out.write_all(text.as_bytes()))?)
 }
@@ -201,21 +207,26 @@ impl Task {
     /// Runs the task.
     pub(super) fn run(&self, bench: &ModelBench, work: &Work) -> Result<(), Refusal> {
         let page = Page::new(bench, work);
+        let current = lock(&bench.project).current();
         bench.forget_best();
         match &self.asked {
             Asked::Identify(args) => {
                 let data = bench.data()?;
                 let request = args.request(data.set.sample_period_s).map_err(told)?;
                 let found = steps::identify(&data.set, &request, &page)?;
-                found.remarks.iter().for_each(|remark| work.warning(remark));
-                self.made(bench, &found.model, "identified", None)?;
+                let mut answer = found.answer.clone();
+                answer.notes.extend(found.remarks.iter().cloned());
+                let id = self.made(bench, &found.model, "identified", None, current)?;
+                told_of(bench, id, &json!({"answer": answer}))?;
             }
             Asked::Extend(args) => {
                 let mut model = self.model(bench)?;
                 args.define(&mut model).map_err(told)?;
                 let found = steps::extend(&model, &bench.data()?.set, args.effects(), &page)?;
                 let step = format!("+ {}", args.effects().join(" + "));
-                self.made(bench, &found.model, &step, Some(self.from))?;
+                let id = self.made(bench, &found.model, &step, Some(self.from), current)?;
+                let told = json!({"answer": found.answer, "parameters": found.parameters});
+                told_of(bench, id, &told)?;
             }
             Asked::Diagnose(args) => {
                 let (mut model, data) = (self.model(bench)?, bench.data()?);
@@ -242,8 +253,8 @@ impl Task {
                     &tried.design.model,
                     &args.goal_words(),
                     Some(self.from),
+                    current,
                 )?;
-                let words = tried.words();
                 let picture = drawings::proof_picture(&tried.proof, args.tracks());
                 let drawn_to = args.picture();
                 let name = drawn_to.file_name().unwrap_or_default();
@@ -252,7 +263,15 @@ impl Task {
                     &bench.beside("loop", id, "csv")?,
                     &tried.proof.trace.to_csv(),
                 )?;
-                let kept = json!({"words": words, "picture": picture});
+                let kept = json!({
+                    "answer": tried.answer(),
+                    "words": tried.design.words(),
+                    "picture": picture.html(),
+                    "margin": tried.margin.as_ref().map(|margin| drawings::margin_picture(margin).html()),
+                    "columns": TRIALS.map(|(name, _)| name),
+                    "rows": trial_rows(&tried.proof),
+                    "caption": trial_caption(&tried.proof),
+                });
                 write(&bench.beside("law", id, "json")?, &kept.to_string())?;
             }
             Asked::Import(args) => {
@@ -281,12 +300,14 @@ impl Task {
         model: &Model,
         step: &str,
         from: Option<u32>,
+        current: Option<u32>,
     ) -> Result<u32, Refusal> {
         bench.keep(&Made {
             model,
             from,
             step: step.to_owned(),
             command: self.line.text(),
+            leaves: Some(current),
         })
     }
 
@@ -313,15 +334,10 @@ impl Task {
             separation.experiment.write_csv(&path)?;
         }
         if let Some(kept) = kept.as_object_mut() {
-            let outcomes = ranking_rows(&found.diagnosis).into_iter();
-            let outcomes = outcomes.filter_map(|row| {
-                let mut cells = row.into_iter();
-                Some((cells.next()?, Value::from(cells.next()?)))
-            });
-            kept.insert("outcomes".to_owned(), Value::Object(outcomes.collect()));
+            kept.insert("rows".to_owned(), ranking_rows(&found.diagnosis).into());
             let picture = page::ranking_picture(&found.diagnosis);
-            kept.insert("picture".to_owned(), picture.into());
-            let experiment = separation.map(drawings::experiment_picture);
+            kept.insert("picture".to_owned(), picture.html().into());
+            let experiment = separation.map(|s| drawings::experiment_picture(s).html());
             kept.insert("experiment_picture".to_owned(), experiment.into());
         }
         write(
@@ -356,7 +372,7 @@ impl Task {
                     "title": format!("{} by {}", term.changes, term.coordinate),
                     "formula": term.formula,
                     "is_formula": term.is_formula,
-                    "picture": page::term_picture(term),
+                    "picture": page::term_picture(term).html(),
                     "file": term.file,
                 })
             })
@@ -378,6 +394,8 @@ impl Task {
             from: Some(self.from),
             step: format!("+ {}", names.join(" + ")),
             command: line.text(),
+            // What was found is shown where it was asked for.
+            leaves: None,
         })?;
         Ok(())
     }

@@ -23,10 +23,11 @@ export const place = (id) => /** @type {HTMLElement} */ (document.getElementById
 /** @param {string} text @param {() => unknown} does @param {Record<string, any>=} attributes */
 export const button = (text, does, attributes = {}) => el("button", { type: "button", onclick: does, ...attributes }, text);
 
-/** A picture of the server, which escapes what is the user's. @param {string} svg @param {string=} group */
-export function picture(svg, group) {
+/** A picture of the server, which escapes what is the user's. @param {string} svg @param {{group?: string, caption?: string}=} more */
+export function picture(svg, { group, caption } = {}) {
   const figure = el("figure", group ? { "data-group": group } : {});
   figure.innerHTML = svg;
+  if (caption) figure.append(el("figcaption", {}, caption));
   saveButtons([figure]);
   return figure;
 }
@@ -40,6 +41,9 @@ export const table = (columns, rows, number) =>
     el("table", {},
       el("thead", {}, el("tr", {}, ...columns.map((c, i) => el("th", { scope: "col", class: number(i) ? "n" : "" }, c)))),
       el("tbody", {}, ...rows.map((row) => el("tr", {}, ...row.map((cell, i) => el("td", { class: number(i) ? "n" : "" }, cell)))))));
+
+/** Words with `code` between backticks. @param {string} text */
+export const inline = (text) => text.split("`").map((part, i) => (i % 2 ? el("code", {}, part) : part));
 
 /** What a form says, as options of a command; what is empty is left out. @param {HTMLFormElement} form */
 export function options(form) {

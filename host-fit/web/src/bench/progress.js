@@ -6,8 +6,12 @@ import { place } from "./dom.js";
 
 /** @type {uPlot | null} */
 let curve = null;
+/** When the piece of work began, by this page's clock, ms. */
+let began = 0;
+let worked = "";
 
 export function clear() {
+  began = 0;
   curve?.destroy();
   curve = null;
 }
@@ -23,7 +27,7 @@ export function progress(best) {
   const values = (/** @type {uPlot} */ _u, /** @type {(number | null)[]} */ splits) => splits.map((v) => (v === null ? "" : significant(v, 3)));
   curve = new uPlot(
     {
-      width: Math.max(200, (place("work").clientWidth || 430) - 30),
+      width: Math.max(200, (place("work").clientWidth || 360) - 28),
       height: 150,
       legend: { show: false },
       cursor: { show: false },
@@ -35,4 +39,21 @@ export function progress(best) {
     data,
     place("curve"),
   );
+}
+
+/** Says which share is done and how long the rest may take: of a search by its evaluations, of other work where it counts itself.
+ * @param {NonNullable<import("./server.js").State["work"]>} work */
+export function left(work) {
+  const now = performance.now();
+  if (worked !== work.name || began === 0) [worked, began] = [work.name, now - 1000 * (work.elapsed_s ?? 0)];
+  const counted = /(\d+) of (\d+)/.exec(work.now);
+  const [done, all] = counted ? [Number(counted[1]), Number(counted[2])] : [work.best.at(-1)?.[0] ?? 0, work.budget ?? 0];
+  const bar = /** @type {HTMLProgressElement} */ (place("work-share"));
+  const share = all > 0 ? Math.min(1, done / all) : 0;
+  if (share > 0) bar.value = share;
+  else bar.removeAttribute("value");
+  const elapsed = (now - began) / 1000;
+  const rest = share > 0 ? elapsed * (1 / share - 1) : 0;
+  const time = (/** @type {number} */ s) => (s < 90 ? `${Math.ceil(s)} s` : `${Math.ceil(s / 60)} min`);
+  place("work-left").textContent = share > 0 ? `${Math.round(100 * share)} % after ${time(elapsed)}; at most ${time(rest)} left` : `${time(elapsed)} so far`;
 }

@@ -4,7 +4,8 @@
  * @typedef {{id: number, parent: number | null, step: string, command: string, rmse: number | null, noise_rmse: number | null, fit_percent: number | null}} Model
  * @typedef {{effect: string, error_reduction_percent: number, p_value: number, significant: boolean, refitted: boolean, parameters: Record<string, {value: number, unit: string, low: number, high: number}>, confounded_with: string[]}} Candidate
  * @typedef {{tone: string, verdict: string, evidence: string, confidence: string, next: string, notes: string[]}} Answer
- * @typedef {{answer: Answer, outcomes: Record<string, string>, missing: string[], ranking: Candidate[], picture: string, experiment: {description: string, separation_sigmas: number, effects: string[]} | null, experiment_picture: string | null}} Diagnosis
+ * @typedef {{answer: Answer, rows: string[][], missing: string[], ranking: Candidate[], picture: string, experiment: {description: string, separation_sigmas: number, effects: string[]} | null, experiment_picture: string | null}} Diagnosis
+ * @typedef {{picture: string, caption: string}} Figure
  * @typedef {{effect: string, title: string, formula: string, is_formula: boolean, picture: string, file: string}} Term
  * @typedef {object} State
  * @property {{title: string, path: string, hash: string, period: number, records: {name: string, use: string, samples: number}[], remarks: string[]} | null} data
@@ -14,14 +15,15 @@
  * @property {string[]} log
  * @property {string[]} uploads
  * @property {{name: string, text: string}[]} own
- * @property {{describe: string, effects: string[], columns: string[], rows: string[][], where: string[], where_picture: string, ladder_picture: string, error: string | null} | null} model
+ * @property {{describe: string, effects: string[], columns: string[], rows: string[][], where: string[], where_picture: string, ladder_picture: string, error: string | null, stretch: Figure[], checks: Figure[], poles: string[][], pole_columns: string[], poles_are: string, parameters: string[][]} | null} model
+ * @property {{answer: Answer, parameters?: Record<string, {value: number, unit: string, low: number, high: number}>} | null} made
  * @property {Diagnosis | null} diagnosis
  * @property {{answer: Answer, terms: Term[]} | null} discovery
- * @property {{words: string, picture: string | null} | null} law
- * @property {{name: string, now: string, best: [number, number][]} | null} work
+ * @property {{answer: Answer, words: string, picture: string, margin: string | null, columns: string[], rows: string[][], caption: string} | null} law
+ * @property {{name: string, now: string, best: [number, number][], budget: number, elapsed_s: number} | null} work
  */
 
-import { el, place } from "./dom.js";
+import { el, inline, place } from "./dom.js";
 
 export const token = new URLSearchParams(location.search).get("token") ?? "";
 
@@ -53,18 +55,35 @@ export async function ask(path, body) {
 /** The address of a file of a model. @param {string} kind @param {number} model */
 export const fileOf = (kind, model) => `/api/file/${kind}/${model}?token=${token}`;
 
+/** A message in the words of the form instead of the command's options; fields that it names are marked. @param {string} text */
+function worded(text) {
+  return text.replace(/'?--([a-z][a-z0-9-]*)(?: <[^>]*>)?'?/g, (option, name) => {
+    const field = document.querySelector(`form.fields [name="${name}"]`);
+    const parts = [...(field?.closest("label")?.childNodes ?? [])].filter((node) => node.nodeType === Node.TEXT_NODE);
+    const words = parts.map((node) => node.textContent).join(" ").trim();
+    if (!field || !words) return option;
+    // The first one named is wrong; others are remedies.
+    if (document.querySelector("form [aria-invalid=true]") === null) {
+      field.setAttribute("aria-invalid", "true");
+      if (field instanceof HTMLElement) field.focus();
+    }
+    return `“${words}”`;
+  });
+}
+
 /** @param {unknown} error */
 export function complain(error) {
   if (error instanceof Gone) return;
   const told = el("div", { class: "verdict warning", role: "alert" },
     el("button", { type: "button", class: "close", "aria-label": "close this message", onclick: () => told.remove() }, "×"),
-    el("p", {}, error instanceof Error ? error.message : String(error)));
+    el("p", {}, ...inline(worded(error instanceof Error ? error.message : String(error)))));
   place("message").append(told);
 }
 
 /** Does something that may be refused. @param {() => Promise<unknown>} does */
 export async function attempt(does) {
   place("message").replaceChildren();
+  for (const field of document.querySelectorAll("form [aria-invalid]")) field.removeAttribute("aria-invalid");
   try {
     await does();
   } catch (error) {

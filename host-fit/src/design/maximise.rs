@@ -1,6 +1,6 @@
 //! The periodic on/off command with the highest mean friction for the air.
 //!
-//! The mean friction is affine in every single command, so optimal commands are on/off (theory 3.4). Over a
+//! The mean friction is affine in every single command, so optimal commands are on/off (theory 3.5). Over a
 //! horizon shorter than the longest lags the benefit of pulsing is invisible; the search is therefore over
 //! periodic commands: period, lengths and phases of the pulses. A finite-horizon search ([`super::horizon`])
 //! can propose further ones.
@@ -75,6 +75,8 @@ pub struct Optimum {
     /// The lowest mean over periods 2 % shorter and longer. This is maximised, because a sharper resonance
     /// would not survive on a rig.
     pub mean_detuned: f64,
+    /// What decided.
+    pub weighed: Weighed,
     /// Number of pulse trains with a higher mean that were rejected because the model diverges under them.
     pub refused: usize,
     /// The best mean friction among those, before the divergence.
@@ -87,6 +89,69 @@ pub struct Optimum {
     /// Result of the finite-horizon search, if requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub planned: Option<Planned>,
+}
+
+/// What the search weighs: the mean friction minus the price of the air. Each value is the lowest of a train and of
+/// the same train with a period 2 % shorter and longer.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Weighed {
+    /// Price of steady blowing, y.
+    pub air_price: f64,
+    /// Value of the optimum, y.
+    pub value: f64,
+    /// Value of steady blowing; `None` if the model diverges.
+    pub steady_value: Option<f64>,
+    /// The best pulses that do not diverge, whether or not they are the optimum.
+    pub pulses: Option<BestPulses>,
+    /// The lowest price of air, y, at which one of the tried pulse trains is better than steady blowing; not
+    /// positive if it is so without a price.
+    pub pulses_pay_from: Option<f64>,
+}
+
+/// The best pulses.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct BestPulses {
+    /// Their mean friction, the lowest with a period 2 % off, y.
+    pub mean: f64,
+    /// Share of time with the valve open.
+    pub duty: f64,
+    /// Their value, y.
+    pub value: f64,
+}
+
+impl Weighed {
+    fn of(best: &Lasting, all: &[&Lasting], air_price: f64) -> Self {
+        let is_steady = |one: &&&Lasting| one.judged.train == Train::steady();
+        let steady = all.iter().find(is_steady);
+        let pulsed = || all.iter().filter(|one| !is_steady(one));
+        let pays_from = |steady: &Lasting| {
+            let saved = |one: &&&Lasting| one.judged.duty < 1.0;
+            let price = |one: &&Lasting| {
+                (steady.robust_mean(air_price) - one.robust_mean(air_price))
+                    / (1.0 - one.judged.duty)
+            };
+            pulsed().filter(saved).map(price).reduce(f64::min)
+        };
+        let best_pulses = pulsed().max_by(|a, b| a.robust_value.total_cmp(&b.robust_value));
+        Self {
+            air_price,
+            value: best.robust_value,
+            steady_value: steady.map(|one| one.robust_value),
+            pulses: best_pulses.map(|one| BestPulses {
+                mean: one.robust_mean(air_price),
+                duty: one.judged.duty,
+                value: one.robust_value,
+            }),
+            pulses_pay_from: steady.and_then(|steady| pays_from(steady)),
+        }
+    }
+}
+
+impl Lasting {
+    /// The mean friction of [`robust_value`](Self::robust_value).
+    fn robust_mean(&self, air_price: f64) -> f64 {
+        self.robust_value + air_price * self.judged.duty
+    }
 }
 
 /// Distance of an optimum from the recorded data.
@@ -208,6 +273,10 @@ pub fn maximise(model: &Model, request: &MaximiseRequest) -> Result<Optimum, Des
             duty: best.duty,
             steady_mean,
             mean_detuned: lasting.detuned,
+            weighed: {
+                let all: Vec<&Lasting> = tried.iter().filter_map(|(_, one)| one.as_ref()).collect();
+                Weighed::of(lasting, &all, request.air_price)
+            },
             refused: better().count(),
             refused_mean: better().map(|(mean, _)| *mean).reduce(f64::max),
             moduli,
@@ -529,6 +598,13 @@ mod tests {
         let known = search.judge(&at_250);
         assert!((known.mean - 0.93).abs() < 0.01, "{known:?}");
         let optimum = maximise(&model, &request(0.4)).unwrap();
+        let weighed = optimum.weighed;
+        let (pulses, steady) = (weighed.pulses.unwrap(), weighed.steady_value.unwrap());
+        assert_eq!(weighed.value, pulses.value.max(steady));
+        assert!((pulses.value - (pulses.mean - 0.4 * pulses.duty)).abs() < 1e-9);
+        // Pulses are the optimum exactly if the price is above the one at which they pay.
+        let pays_from = weighed.pulses_pay_from.unwrap();
+        assert_eq!(pulses.value > steady, 0.4 > pays_from, "{weighed:?}");
         assert!(optimum.mean_detuned > 0.95 * optimum.mean, "{optimum:?}");
     }
 

@@ -1,6 +1,7 @@
 //! Control laws: design from a model, and trials in closed loop before use on a valve.
 
 mod bench;
+mod certificate;
 mod error;
 mod horizon;
 mod margin;
@@ -14,9 +15,10 @@ mod steady;
 mod tracking;
 mod train;
 
+pub use certificate::{Bound, Certificate, certificate};
 pub use error::{DesignError, check_period};
 pub use margin::{ERRORS, ErrorInterval, Margin, MarginPlane, margin};
-pub use maximise::{MaximiseRequest, Optimum, Outside, Planned, maximise};
+pub use maximise::{BestPulses, MaximiseRequest, Optimum, Outside, Planned, Weighed, maximise};
 pub use possible::{PossibleFlow, possible_flows};
 pub use proof::{Case, CaseGroup, Proof, Trial, Trials, judged, prove, prove_pulses, run_law};
 pub use rules::{RULES, Rules};

@@ -1,6 +1,7 @@
 //! Parameters of the tracking law, from the model and the valve's limits.
 
 use super::bench::{Player, hold_times};
+use super::certificate::{Certificate, certificate};
 use super::error::{DesignError, check};
 use super::rules::RULES;
 use super::steady::{Steady, steady, time_constants};
@@ -72,6 +73,8 @@ pub struct TrackDesign {
     /// The duty that the law takes on the model.
     #[serde(rename = "duty_on_model")]
     pub duty: f64,
+    /// Where the flow ends on the model, if that can be proven.
+    pub certificate: Certificate,
     /// Remarks for the user.
     pub remarks: Vec<String>,
 }
@@ -243,6 +246,7 @@ pub fn track(model: &Model, request: &TrackRequest) -> Result<TrackDesign, Desig
         });
     }
     Ok(TrackDesign {
+        certificate: certificate(model, &law),
         law,
         target: request.target,
         reachable: [reachable.low, reachable.high],

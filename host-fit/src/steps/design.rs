@@ -130,6 +130,7 @@ impl TrackDesign {
     fn outward(mut self, units: &Units, target: f64) -> Self {
         let level = |y: f64| y * units.y + units.zero;
         self.target = target;
+        self.certificate = self.certificate.scaled(units.y);
         self.reachable = self.reachable.map(level);
         for steady in [&mut self.natural, &mut self.blown] {
             steady.friction = level(steady.friction);
@@ -160,6 +161,15 @@ impl Optimum {
             &mut self.mean_detuned,
         ] {
             *y = level(*y);
+        }
+        let weighed = &mut self.weighed;
+        weighed.air_price *= units.y;
+        weighed.value = level(weighed.value);
+        weighed.steady_value = weighed.steady_value.map(level);
+        weighed.pulses_pay_from = weighed.pulses_pay_from.map(|price| price * units.y);
+        if let Some(pulses) = &mut weighed.pulses {
+            pulses.mean = level(pulses.mean);
+            pulses.value = level(pulses.value);
         }
         self.range = self.range.map(level);
         self.steady_mean = self.steady_mean.map(level);

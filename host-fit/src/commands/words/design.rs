@@ -2,7 +2,9 @@
 
 use super::Words;
 use closed_loop::{Figures, span};
-use host_fit::design::{Case, CaseGroup, Margin, Optimum, Proof, RULES, TrackDesign, judged};
+use host_fit::design::{
+    Case, CaseGroup, Certificate, Margin, Optimum, Proof, RULES, TrackDesign, Weighed, judged,
+};
 use host_fit::steps::{Design, DesignOutcome};
 
 impl Words for Design {
@@ -55,11 +57,27 @@ fn track_words(design: &TrackDesign, period_s: f64) -> String {
         ms(law.look_ahead.into()),
         every(period_s)
     );
+    text.push('\n');
+    text.push_str(&certificate_words(&design.certificate));
     for remark in &design.remarks {
         text.push_str("\nnote: ");
         text.push_str(remark);
     }
     text
+}
+
+/// The proven bound, or why there is none.
+fn certificate_words(certificate: &Certificate) -> String {
+    match certificate {
+        Certificate::Bound(bound) => format!(
+            "certificate: on the model the flow ends within −{:.3} … +{:.3} of the target from any start; with a prediction \
+             error of {:.3} within −{:.3} … +{:.3}",
+            bound.below, bound.above, bound.error, bound.below_with_error, bound.above_with_error
+        ),
+        Certificate::None { reason } => {
+            format!("no certificate: {reason}; the trials and the margin are simulations")
+        }
+    }
 }
 
 /// The loop's period in words; empty for the usual one.
@@ -95,6 +113,8 @@ fn optimum_words(optimum: &Optimum, period_s: f64) -> String {
             every(period_s)
         )
     };
+    text.push('\n');
+    text.push_str(&weighed_words(&optimum.weighed, law.period == 1));
     text.push_str(&format!(
         "\nafter {} {:.3}; with the period 2 % off {:.3}; pole moduli {:.5} closed, {:.5} open",
         duration(RULES.long_until, period_s),
@@ -141,6 +161,31 @@ fn optimum_words(optimum: &Optimum, period_s: f64) -> String {
             "\noutside the training envelope: y by {:.3}, duty by {:.3}, on-times by a factor {:.2}",
             outside.friction, outside.duty, outside.on_time_factor
         )),
+    }
+    text
+}
+
+/// What was weighed, and why steady blowing is better where it is.
+fn weighed_words(weighed: &Weighed, is_steady: bool) -> String {
+    let mut text = format!(
+        "weighed: mean y minus {} times the share of time open, the lowest with the period up to 2 % off",
+        weighed.air_price
+    );
+    let (Some(pulses), Some(steady)) = (weighed.pulses, weighed.steady_value) else {
+        return text;
+    };
+    text.push_str(&format!(
+        "\nsteady blowing {steady:.3}; the best pulses {:.3} (mean y {:.3} with {:.1} % of the air)",
+        pulses.value,
+        pulses.mean,
+        100.0 * pulses.duty
+    ));
+    if let Some(price) = weighed.pulses_pay_from
+        && is_steady
+    {
+        text.push_str(&format!(
+            "\nwhy steady blowing: pulses lose more friction than their air is worth; they pay from --air-price {price:.3}"
+        ));
     }
     text
 }

@@ -359,7 +359,6 @@ mod tests {
             0.001
         }
         fn step(&mut self, command: bool) -> Option<f64> {
-            let reading = self.y;
             self.line.push_back(command);
             let (level, time_s) = match self.line.pop_front() {
                 Some(true) => (LEVELS[1], ATTACHES_S),
@@ -367,7 +366,7 @@ mod tests {
             };
             let level = self.gain * level;
             self.y = level + (self.y - level) * (-0.001 / time_s).exp();
-            Some(reading)
+            Some(self.y)
         }
         fn friction(&self) -> f64 {
             self.y
@@ -401,11 +400,10 @@ mod tests {
             min_off_s: off,
             ..TrackRequest::holding(target)
         };
-        // The corrections come to rest: the bound is of an exact prediction. With a dead band the bias would keep
-        // what the first seconds taught it.
+        // The corrections rest: the bound is of an exact prediction.
         Track {
             integral_rate: 0.0,
-            play: 0.0,
+            bias_rate: 0.0,
             ..track(model, &request).unwrap().law
         }
     }
@@ -438,6 +436,7 @@ mod tests {
     #[test]
     fn a_flow_in_closed_form_stays_within_the_bound_and_comes_close_to_it() {
         let model = model();
+        let mut none = 0;
         for target in [0.25, 0.5, 0.8, 1.0] {
             for hold in [
                 [0.001, 0.001],
@@ -446,7 +445,11 @@ mod tests {
                 [0.040, 0.005],
             ] {
                 let law = law(&model, target, hold);
-                let bound = bound(&model, &law);
+                // At 0.25 an opening of 40 ms overshoots from the level without blowing: the valve stays closed.
+                let Certificate::Bound(bound) = certificate(&model, &law) else {
+                    none += 1;
+                    continue;
+                };
                 let place = format!("{target} {hold:?} {bound:?}");
                 for start in [0.1, 0.6, 1.1] {
                     let [low, high] = range(&model, &law, Flow::new(start, DEAD_TIME.into()));
@@ -462,6 +465,7 @@ mod tests {
                 assert!(bound.above_with_error > bound.above && bound.error > 0.0);
             }
         }
+        assert!(none <= 2, "{none} of 16 without a bound");
     }
 
     /// The bound is of the model: without corrections a flow with other levels leaves it.
@@ -470,7 +474,6 @@ mod tests {
         let model = model();
         let law = Track {
             observer: 0.0,
-            bias_rate: 0.0,
             ..law(&model, 0.6, [0.005, 0.005])
         };
         let bound = bound(&model, &law);

@@ -53,8 +53,11 @@ pub struct Detectable {
     pub amplitude: Option<f64>,
     /// All parameters of the effect at that amplitude, in the order of its card.
     pub parameters: Vec<f64>,
-    /// The same in words.
+    /// The same in words, which begin with those of the effect.
     pub words: String,
+    /// The words of the effect.
+    #[serde(skip)]
+    pub(crate) subject: &'static str,
 }
 
 /// The detectable amplitude of each effect of the catalogue that has an amplitude, is not in the model and
@@ -205,6 +208,7 @@ impl Detector<'_> {
             amplitude,
             parameters,
             words,
+            subject: card.words,
         })
     }
 

@@ -413,7 +413,7 @@ fn a_folder_stands_for_its_files() {
             .unwrap_err()
             .to_string()
     };
-    assert!(refuse(folder.path(), true).contains("a.csv: is read"));
+    assert!(refuse(folder.path(), true).contains("a.csv: is an input"));
     let set = folder.path().join("set");
     found.refuse_to_replace(&set, false).unwrap();
     found.save(&set).unwrap();

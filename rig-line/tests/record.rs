@@ -312,8 +312,9 @@ fn a_loop_is_watched_logged_and_judged() {
     let Some(Verdict::Stopped { at_s, .. }) = watched.verdict else {
         panic!("{watched:?}");
     };
-    // The judgement counts the time of the law, from the second second on.
-    assert!((39.0..43.0).contains(&at_s), "{at_s}");
+    // The judgement counts the time of the law, from the second second on. The shift comes when this thread has heard of
+    // the 40th second, which the emulated board may have left behind by then.
+    assert!((39.0..50.0).contains(&at_s), "{at_s}");
     assert_eq!((watched.lost_samples, watched.logged), (0, 10_000));
     assert!(watched.rms_error.is_some_and(|e| e < 0.2), "{watched:?}");
     let set = recordings::DataSet::load(&log).expect("a data set");

@@ -435,7 +435,7 @@ pub(super) mod tests {
         let model = paper_state_dependent(LagConvention::OneStep);
         for target in [-0.1, 0.0, 1.2, f64::NAN] {
             let error = track(&model, &TrackRequest::holding(target)).unwrap_err();
-            assert!(error.to_string().contains("(0"), "{error}");
+            assert!(error.to_string().contains("between 0.0000 and"), "{error}");
             assert!(matches!(error, DesignError::Unreachable(_)));
         }
         let thirsty = TrackRequest {

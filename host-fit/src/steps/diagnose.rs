@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 
 use super::onlooker::watched;
 use super::prepared::prepared;
-use super::{Answer, Onlooker, StepError, check_period, trained_in_free_run, verdict};
-use crate::data::{DataSet, Record};
+use super::{Answer, Onlooker, StepError, check_period, symptom, trained_in_free_run, verdict};
+use crate::data::{DataSet, Plant, Record};
 use crate::diagnose::{
     Certificate, Diagnosis, HeldOutBy, Memory, NotTried, Options, Parsimony, Quoted,
     RULES as DIAGNOSE, Ranked, Rung, Verdict, diagnose as search,
@@ -181,11 +181,18 @@ pub fn diagnose(
         Err(error @ SimulateError::Diverged { .. }) => (None, Some(error.to_string())),
         Err(error) => return Err(error.into()),
     };
-    let detectable = match detectable {
+    let mut detectable = match detectable {
         // A model at the stability limit has no detectable sizes.
         Err(SimulateError::Diverged { .. }) => Vec::new(),
         other => other?,
     };
+    if set.plant != Plant::Flow {
+        for effect in &mut detectable {
+            if let Some(behaviour) = symptom::shown(&effect.effect, None) {
+                effect.words = effect.words.replacen(effect.subject, &behaviour, 1);
+            }
+        }
+    }
     let runs_before = score(model, &records).ok().map(|(_, runs)| runs);
     let (scores, runs) = match score(&diagnosis.model, &records) {
         Ok((scores, runs)) => (scores, Some(runs)),

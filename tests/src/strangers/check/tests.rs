@@ -110,7 +110,7 @@ fn each_fault_is_named() {
     );
     one(
         &with(|h| h.models[0].1.document["identify"]["rmse"] = json!(0.1)),
-        "is not what compare",
+        "differs from that of compare",
     );
     one(&with(|h| h.fits.sopdt = Some(99.1)), "second order");
     one(

@@ -430,7 +430,7 @@ fn a_folder_stands_for_its_files() {
             .contains("name the files")
     );
     fs::write(other.join("b.csv"), "").unwrap();
-    assert!(refuse(&other, false).contains("b.csv: is there already"));
+    assert!(refuse(&other, false).contains("b.csv: exists already"));
 }
 
 #[test]

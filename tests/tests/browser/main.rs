@@ -24,10 +24,12 @@ fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
 }
 
-/// Runs the program on files and options.
+/// Runs the program on files and options, from the project's root: a page that prints short paths does not depend on where
+/// the project lies.
 #[track_caller]
 fn run(arguments: &[&dyn AsRef<std::ffi::OsStr>]) {
     let output = Command::new(program())
+        .current_dir(root())
         .args(arguments.iter().map(|a| a.as_ref()))
         .output()
         .expect("the program starts");

@@ -3,15 +3,17 @@
 use scenarios::browser::Browser;
 
 use super::print::keeps_its_curves;
-use super::{SLOWEST_FRAME, accessible, act, fits, panned, readable, root, run, shoot, until};
+use super::{SLOWEST_FRAME, accessible, act, fits, panned, readable, run, shoot, until};
 
 #[test]
 #[ignore = "needs chromium: cargo xtask browser"]
 fn a_report_is_looked_along() {
     let folder = tempfile::tempdir().expect("a folder");
     let page_file = folder.path().join("report.html");
-    let model = root().join("data/paper/table-2-state-dependent.toml");
-    let data = root().join("data/hidden-ramp");
+    let (model, data) = (
+        "data/paper/table-2-state-dependent.toml",
+        "data/hidden-ramp",
+    );
     run(&[&"compare", &model, &data, &"--report", &page_file]);
     let size = std::fs::metadata(&page_file).expect("the report").len();
     eprintln!("  a report of 8 records weighs {:.2} MB", size as f64 / 1e6);

@@ -13,6 +13,18 @@ pub mod strangers;
 use std::path::PathBuf;
 use std::process::Command;
 
+/// Options of a `design` whose contract is tested, not its law: trials of half the length, and a coarse robustness margin.
+pub const QUICK_DESIGN: [&str; 8] = [
+    "--set",
+    "design.trial=6000",
+    "--set",
+    "design.trial-from=2000",
+    "--set",
+    "design.margin-rays=4",
+    "--set",
+    "design.margin-bisections=2",
+];
+
 /// The program `host-fit`, built beside the running test or tool.
 ///
 /// # Panics

@@ -8,7 +8,7 @@ use host_fit::model::{Law, Model};
 use host_fit::user_effect::Definition;
 use model_core::recursion::LagConvention;
 use scenarios::campaign::Part;
-use scenarios::program;
+use scenarios::{QUICK_DESIGN, program};
 use serde_json::Value;
 
 fn data(name: &str) -> PathBuf {
@@ -305,18 +305,6 @@ fn part_of_the_ramp(folder: &Path) -> PathBuf {
     path
 }
 
-/// For tests of the contract of `design`: trials of half the length, and a coarse robustness margin.
-const QUICK: [&str; 8] = [
-    "--set",
-    "design.trial=6000",
-    "--set",
-    "design.trial-from=2000",
-    "--set",
-    "design.margin-rays=4",
-    "--set",
-    "design.margin-bisections=2",
-];
-
 #[test]
 fn extend_finds_the_hidden_plenum() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -531,7 +519,7 @@ fn a_law_is_designed_for_a_model_with_an_effect_of_ones_own() {
         p("--target"),
         p("0.6"),
     ];
-    let design = json(&[&asked[..], &QUICK.map(p)].concat());
+    let design = json(&[&asked[..], &QUICK_DESIGN.map(p)].concat());
     let notes = design["not_tried"].to_string();
     assert!(notes.contains("without supply-line-ringing"), "{notes}");
     assert!(
@@ -571,7 +559,7 @@ fn stress_warns_and_refuses_nothing() {
         p("--target"),
         p("0.5"),
     ];
-    let output = run(&[&asked[..], &QUICK.map(p)].concat());
+    let output = run(&[&asked[..], &QUICK_DESIGN.map(p)].concat());
     let said = String::from_utf8_lossy(&output.stdout);
     assert_eq!(output.status.code(), Some(0), "{said}");
     for part in [
@@ -620,7 +608,7 @@ fn a_law_that_loses_its_own_model_is_refused_with_the_targets_that_pass() {
     let arguments = [
         &[p("design"), &model, p("-o"), &controlled][..],
         &[p("--target"), p("0.5"), p("--min-off"), p("0.6")],
-        &QUICK.map(p),
+        &QUICK_DESIGN.map(p),
     ]
     .concat();
     let with = |more: &[&'static str]| {
@@ -683,7 +671,7 @@ fn a_law_is_asked_for_in_the_units_of_the_sensor() {
         p("--target"),
         p("2.425"),
     ];
-    let design = json(&[&asked[..], &QUICK.map(p)].concat());
+    let design = json(&[&asked[..], &QUICK_DESIGN.map(p)].concat());
     let close = |value: &serde_json::Value, to: f64| {
         let value = value.as_f64().expect("a number");
         assert!((value - to).abs() < 0.002, "{value} is not {to}");

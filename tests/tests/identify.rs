@@ -239,7 +239,7 @@ fn an_interrupt_keeps_the_best_so_far() {
     assert!(is_written);
 }
 
-/// A search that is still running at that time, and is told to stop.
+/// A search that is interrupted after that time.
 #[cfg(unix)]
 fn interrupted_after(seconds: f64, model: &Path) -> Output {
     let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("../data/paper-like");

@@ -6,7 +6,7 @@ use std::process::{Command, Output};
 use host_fit::model::{Law, Model};
 use host_fit::terms::Units;
 use model_core::recursion::LagConvention;
-use scenarios::program;
+use scenarios::{QUICK_DESIGN, program};
 
 /// The paper's flow on a rig that is slower by the ratio of the period to 1 ms.
 fn paper_at(period_s: f64) -> Model {
@@ -45,7 +45,7 @@ fn a_slower_rig_gets_the_same_law_and_constants_with_its_period() {
         let name = |suffix: &str| folder.path().join(suffix).to_string_lossy().into_owned();
         let [model, controlled, constants] = [name("m.toml"), name("c.toml"), name("c.rs")];
         paper_at(period_s).save(Path::new(&model)).expect("saved");
-        let output = run(&[
+        let mut arguments = vec![
             "--json",
             "design",
             &model,
@@ -57,16 +57,9 @@ fn a_slower_rig_gets_the_same_law_and_constants_with_its_period() {
             "12samples",
             "--min-off",
             "12samples",
-            // Trials of half the length, and a coarse robustness margin.
-            "--set",
-            "design.trial=6000",
-            "--set",
-            "design.trial-from=2000",
-            "--set",
-            "design.margin-rays=4",
-            "--set",
-            "design.margin-bisections=2",
-        ]);
+        ];
+        arguments.extend(QUICK_DESIGN);
+        let output = run(&arguments);
         assert_eq!(output.status.code(), Some(0), "{}", error_of(&output));
         let json: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
         assert_eq!(json["sample_period_s"].as_f64(), Some(period_s));

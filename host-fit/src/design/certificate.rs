@@ -41,11 +41,11 @@ pub struct Bound {
     pub below: f64,
     /// Largest distance above it.
     pub above: f64,
-    /// An error of the corrected prediction, 1 % of the reachable interval …
+    /// Prediction error for which the distances are stated a second time: 1 % of the reachable interval.
     pub error: f64,
-    /// … and the distances with it.
+    /// Largest distance below the target if the prediction is wrong by up to `error`.
     pub below_with_error: f64,
-    /// See [`below_with_error`](Self::below_with_error).
+    /// Largest distance above the target if the prediction is wrong by up to `error`.
     pub above_with_error: f64,
 }
 

@@ -148,7 +148,7 @@ fn document(description: &str, width: f64, paint: impl Fn(&mut Canvas) -> f64) -
          viewBox=\"0 0 {width} {height:.0}\" role=\"img\" stroke-linejoin=\"round\" \
          font-family=\"Helvetica, Arial, sans-serif\">\n<title>{}</title>\n\
          <rect width=\"100%\" height=\"100%\" fill=\"{PAPER}\"/>\n{}</svg>\n",
-        super::report::escape(description),
+        super::format::escape(description),
         canvas.elements,
     )
 }
@@ -256,8 +256,8 @@ impl Canvas {
             "<rect {} {} data-bar=\"{}\" aria-label=\"{}\"/>",
             between(corner, opposite),
             ink.fill(),
-            super::report::escape(name),
-            super::report::escape(label),
+            super::format::escape(name),
+            super::format::escape(label),
         ));
     }
 
@@ -311,7 +311,7 @@ impl Canvas {
              fill=\"{}\"{turn}>{}</text>",
             words.size,
             words.colour,
-            super::report::escape(text)
+            super::format::escape(text)
         ));
     }
 }

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::canvas::Picture;
-use super::format::with_minus;
+use super::format::{escape, with_minus};
 use super::living::{self, Bundle, Living};
 use super::palette;
 
@@ -386,28 +386,6 @@ fn page(title: &str, bundle: &Bundle, policy: &str, class: &str, body: &str) -> 
         rules = palette::dark_rules("figure svg"),
         script = bundle.script,
     )
-}
-
-/// `text` for HTML and XML; characters that these forbid become U+FFFD.
-pub(super) fn escape(text: &str) -> String {
-    let mut safe = String::with_capacity(text.len());
-    for c in text.chars() {
-        match c {
-            '<' => safe.push_str("&lt;"),
-            '>' => safe.push_str("&gt;"),
-            '&' => safe.push_str("&amp;"),
-            '"' => safe.push_str("&quot;"),
-            '\'' => safe.push_str("&#39;"),
-            c if !allowed(c) => safe.push('\u{fffd}'),
-            c => safe.push(c),
-        }
-    }
-    safe
-}
-
-/// Whether XML 1.0 allows the character (its `Char` production).
-pub(super) fn allowed(c: char) -> bool {
-    matches!(c, '\t' | '\n' | '\r' | '\u{20}'..='\u{d7ff}' | '\u{e000}'..='\u{fffd}' | '\u{10000}'..)
 }
 
 /// Escaped text with `` `code` `` marked; a backtick without a partner stays.

@@ -113,7 +113,7 @@ fn a_term_that_no_catalogue_has_is_found_and_taken_as_a_formula() {
         "document.querySelectorAll('.model')[1].textContent.includes('-by-pulse-number')",
     );
     steps.done("discovered");
-    // What was found is told where it was looked for: the page stays with its model, and says where the new one is.
+    // The finding appears in the section of the search: the page stays with its model and links to the new one.
     until(
         &mut b,
         &page,

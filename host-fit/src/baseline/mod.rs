@@ -13,6 +13,7 @@ pub use arx::Arx;
 pub use process::{FirstOrder, Recursion, SecondOrder};
 
 use crate::data::Record;
+use refine::Fitted;
 use serde::Serialize;
 use series::{Scaling, Series};
 use std::ops::Range;
@@ -46,29 +47,31 @@ impl Baselines {
     /// Fits all three to `learning`. All are `None` if u or y is constant, or if no record has 8 samples.
     #[must_use]
     pub fn fit(learning: &[&Record]) -> Self {
-        let long: Vec<&Record> = learning
-            .iter()
-            .copied()
-            .filter(|r| r.len() >= SHORTEST && r.y.len() == r.len() && r.sample_period_s > 0.0)
-            .collect();
-        let (Some(scaling), Some(period_s)) =
-            (Scaling::of(&long), long.first().map(|r| r.sample_period_s))
-        else {
+        let Some(fitted) = WithDeadTime::to(learning) else {
             return Self::default();
         };
-        let series: Vec<Series> = long.iter().map(|record| scaling.scaled(record)).collect();
-        let longest = series.iter().map(Series::len).max().unwrap_or(0);
-        let longest_dead_time = longest / 3;
-        let (first, second) = process::fit(&series, longest_dead_time);
-        let near: Vec<f64> = [first, second]
+        let near: Vec<f64> = [fitted.first, fitted.second]
             .iter()
             .filter_map(|fitted| Some(fitted.as_ref()?.at.dead_time))
             .collect();
+        let first = fitted.first.as_ref();
         Self {
-            fopdt: first.and_then(|fitted| FirstOrder::of(&fitted, &scaling, period_s)),
-            sopdt: second.and_then(|fitted| SecondOrder::of(&fitted, &scaling, period_s)),
-            arx: arx::fit(&series, &scaling, longest_dead_time, &near),
+            fopdt: first
+                .and_then(|first| FirstOrder::of(first, &fitted.scaling, fitted.sample_period_s)),
+            sopdt: fitted.second_order(),
+            arx: arx::fit(
+                &fitted.series,
+                &fitted.scaling,
+                fitted.longest_dead_time,
+                &near,
+            ),
         }
+    }
+
+    /// Fits the second order with dead time alone: [`sopdt`](Self::sopdt) of [`fit`](Self::fit).
+    #[must_use]
+    pub fn second_order(learning: &[&Record]) -> Option<SecondOrder> {
+        WithDeadTime::to(learning)?.second_order()
     }
 
     /// FIT of each over the scored samples of `records` together, in percent. Samples before `scored.start` are
@@ -111,6 +114,45 @@ impl Baselines {
         };
         say(name, fits.arx, arx);
         lines
+    }
+}
+
+/// The two models with dead time in scaled records.
+struct WithDeadTime {
+    series: Vec<Series>,
+    scaling: Scaling,
+    sample_period_s: f64,
+    longest_dead_time: usize,
+    first: Option<Fitted>,
+    second: Option<Fitted>,
+}
+
+impl WithDeadTime {
+    /// `None` if u or y is constant, or if no record is long enough.
+    fn to(learning: &[&Record]) -> Option<Self> {
+        let long: Vec<&Record> = learning
+            .iter()
+            .copied()
+            .filter(|r| r.len() >= SHORTEST && r.y.len() == r.len() && r.sample_period_s > 0.0)
+            .collect();
+        let scaling = Scaling::of(&long)?;
+        let sample_period_s = long.first()?.sample_period_s;
+        let series: Vec<Series> = long.iter().map(|record| scaling.scaled(record)).collect();
+        let longest = series.iter().map(Series::len).max().unwrap_or(0);
+        let longest_dead_time = longest / 3;
+        let (first, second) = process::fit(&series, longest_dead_time);
+        Some(Self {
+            series,
+            scaling,
+            sample_period_s,
+            longest_dead_time,
+            first,
+            second,
+        })
+    }
+
+    fn second_order(&self) -> Option<SecondOrder> {
+        SecondOrder::of(self.second.as_ref()?, &self.scaling, self.sample_period_s)
     }
 }
 

@@ -6,7 +6,7 @@ use super::ranking::Rival;
 use super::session::Session;
 use crate::model::Model;
 use crate::parallel;
-use crate::terms::{Found, Hypothesis, MostLikely, log_e, p_of};
+use crate::terms::{Found, Hypothesis, MostLikely, Term, log_e, p_of};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::sync::PoisonError;
@@ -64,20 +64,15 @@ pub struct Parsimony {
 }
 
 impl Session<'_> {
-    /// Compares `last`, which has these effects, with `given`. `None` unless it has more evidence and fewer
+    /// Compares `last`, which has these effects, with the given model. `None` unless it has more evidence and fewer
     /// parameters.
-    pub(super) fn parsimony(
-        &self,
-        given: &Model,
-        last: &Hypothesis,
-        effects: &[String],
-    ) -> Option<Parsimony> {
+    pub(super) fn parsimony(&self, last: &Hypothesis, effects: &[String]) -> Option<Parsimony> {
         let count = |model: &Model| model.coordinates().len();
-        let terms_fewer = count(given).checked_sub(count(last.judged.model()))?;
+        let terms_fewer = count(self.given).checked_sub(count(last.judged.model()))?;
         if terms_fewer == 0 || effects.is_empty() {
             return None;
         }
-        let nats = self.evidence_of(last.judged.model())? - self.evidence_of(given)?;
+        let nats = self.evidence_of(last.judged.model())? - self.evidence_of(self.given)?;
         (nats > 0.0).then(|| Parsimony {
             effects: effects.to_vec(),
             nats,
@@ -102,14 +97,30 @@ impl Session<'_> {
         evidence
     }
 
-    /// The certificate of all effects of `subject` together, against one model without them.
+    /// The certificate of all effects of `subject` together, against one model without them and the given model.
     pub(super) fn certified(
         &self,
         subject: &Hypothesis,
         without: &Hypothesis,
         found: &Found,
     ) -> Option<Certificate> {
-        self.certificate(subject, &[self.null(without)?], found)
+        let effects = subject.terms.iter().filter_map(Term::effect);
+        let names: Vec<&str> = effects.map(|effect| effect.name).collect();
+        let nulls: Vec<Null> = std::iter::once(self.null(without)?)
+            .chain(self.given_without(&names))
+            .collect();
+        self.certificate(subject, &nulls, found)
+    }
+
+    /// The given model as a null model, unless it has one of these effects or diverges.
+    fn given_without(&self, effects: &[&str]) -> Option<Null> {
+        if effects.iter().any(|name| self.given.has_effect(name)) {
+            return None;
+        }
+        Some(Null {
+            evidence: self.evidence_of(self.given)?,
+            excess: self.judge().excess(self.as_given),
+        })
     }
 
     fn null(&self, hypothesis: &Hypothesis) -> Option<Null> {
@@ -191,7 +202,9 @@ impl Session<'_> {
         let certificates = effects.into_iter().filter_map(|(name, places)| {
             // Without the evidence of a null model nothing is certified.
             let nulls: Option<Vec<Null>> = places.into_iter().map(|at| nulls[at]).collect();
-            Some((name, self.certificate(subject, &nulls?, found)?))
+            let mut nulls = nulls?;
+            nulls.extend(self.given_without(&[&name]));
+            Some((name, self.certificate(subject, &nulls, found)?))
         });
         certificates.collect()
     }

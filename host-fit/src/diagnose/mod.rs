@@ -119,14 +119,16 @@ fn chosen(
         interrupt,
         progress,
     };
+    progress("the model as given");
+    let as_given = judge.held_out(|_| &given_inside)?;
     let session = Session {
         search: &search,
         units,
         options,
+        given: &given_inside,
+        as_given: &as_given,
         evidences: Mutex::default(),
     };
-    progress("the model as given");
-    let as_given = judge.held_out(|_| &given_inside)?;
     let first = Rung::of(
         &judge,
         &session.units,
@@ -140,13 +142,13 @@ fn chosen(
         let given_alone = Hypothesis::new(judge.refitted(&given_inside)?);
         let second = session.rung(&given_alone.judged, &[], "refitted");
         let rungs = [first, second];
-        return Ok(session.conclude(given_alone.alone(), rungs, &given_inside, &as_given, None));
+        return Ok(session.conclude(given_alone.alone(), rungs, None));
     }
     progress("the model with the fewest lags");
     // Data sets of other plants than flows: the user chooses the lags.
     let own_dynamics = mid_run && given.start == Start::Measured && !judge.on_off;
     let (root, step) = if own_dynamics {
-        session.root_of_given(&given_inside, &as_given)?
+        session.root_of_given()?
     } else {
         let root = search.root(&given_inside, mid_run)?;
         (root, "refitted with the fewest lags")
@@ -204,6 +206,6 @@ fn chosen(
     let restarted_s = restarted.map(|samples| samples as f64 * given.sample_period_s);
     let second = session.rung(&origin.judged, &[], step);
     let rungs = [first.clone(), second];
-    let concluded = session.conclude(found, rungs, &given_inside, &as_given, restarted_s);
+    let concluded = session.conclude(found, rungs, restarted_s);
     Ok(concluded.no_worse_than(given, first))
 }

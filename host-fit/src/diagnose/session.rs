@@ -21,6 +21,10 @@ pub(super) struct Session<'a> {
     pub(super) search: &'a Search<'a>,
     pub(super) units: Units,
     pub(super) options: &'a Options,
+    /// The given model.
+    pub(super) given: &'a Model,
+    /// Its validation error.
+    pub(super) as_given: &'a HeldOut,
     /// ln of the evidence of models, nats, for those models that were compared so far.
     pub(super) evidences: Mutex<Vec<(Model, Option<f64>)>>,
 }
@@ -68,11 +72,8 @@ impl Session<'_> {
     /// The given model's own structure, for users who chose lags and delays themselves. The product u·y is added if
     /// it is missing and lowers the error, because it belongs to the base class and never counts as a missing
     /// effect.
-    pub(super) fn root_of_given(
-        &self,
-        given: &Model,
-        as_given: &HeldOut,
-    ) -> Result<(Hypothesis, &'static str), DiagnoseError> {
+    pub(super) fn root_of_given(&self) -> Result<(Hypothesis, &'static str), DiagnoseError> {
+        let (given, as_given) = (self.given, self.as_given);
         let plain = self.judge().refitted(given)?;
         if given.product_lags.is_empty() {
             let bilinear = Model {
@@ -99,8 +100,6 @@ impl Session<'_> {
         &self,
         found: Found,
         first: [Rung; 2],
-        given: &Model,
-        as_given: &HeldOut,
         restarted_s: Option<f64>,
     ) -> Diagnosis {
         let (search, judge, units) = (self.search, self.judge(), &self.units);
@@ -110,7 +109,7 @@ impl Session<'_> {
         // One effect alone may give a smaller error than all effects found together.
         let alone = compared.best_alone();
         let alone = alone.filter(|alone| alone.score() < named.score());
-        let concluded = |best: &Hypothesis| self.concluded(best, &found, as_given);
+        let concluded = |best: &Hypothesis| self.concluded(best, &found);
         let Conclusion {
             verdict,
             model: last,
@@ -227,7 +226,7 @@ impl Session<'_> {
             .filter(|_| verdict == Verdict::PartlyExplained);
         let certified = certified.filter(|name| is_certified(name));
         let certified = certified.cloned().collect();
-        let parsimony = self.parsimony(given, &last, &missing);
+        let parsimony = self.parsimony(&last, &missing);
         Diagnosis {
             verdict,
             sets: sets.iter().map(Set::names).collect(),
@@ -353,12 +352,6 @@ mod tests {
         let options = Options::default();
         let never = AtomicBool::new(false);
         let search = Search::silent(&bench.judge, 4, &never);
-        let session = Session {
-            search: &search,
-            units: bench.units,
-            options: &options,
-            evidences: Mutex::default(),
-        };
         let with = |effects: &[(&str, &[f64])]| {
             let mut model = bench.given.clone();
             for (name, start) in effects {
@@ -379,20 +372,29 @@ mod tests {
         let found = bare.clone().alone();
         let drifting = ("thermal-drift", [0.1, 1.0].as_slice());
         let both = with(&[drifting, ("stopping-vortex", &[0.001, 0.03])]);
+        let session = |as_given| Session {
+            search: &search,
+            units: bench.units,
+            options: &options,
+            given: &bench.given,
+            as_given,
+            evidences: Mutex::default(),
+        };
         let as_given = &bare.judged.held_out;
         let searched = Found {
             all: vec![bare.clone(), both.clone()],
             best: both,
             ..found.clone()
         };
-        let claimed = session.concluded(&session.named(&searched), &searched, as_given);
+        let usual = session(as_given);
+        let claimed = usual.concluded(&usual.named(&searched), &searched);
         let names: Vec<&str> = claimed.effects.iter().map(|spec| spec.name).collect();
         assert_eq!(names, ["thermal-drift"]);
         assert_eq!(claimed.verdict, Verdict::EffectMissing);
         // The verdict refers to the resulting model: nothing is missing in a given model at the noise level.
-        let verdict = |as_given: &HeldOut| session.concluded(&bare, &found, as_given).verdict;
-        assert_eq!(verdict(as_given), Verdict::Unexplained);
+        let verdict = |session: Session<'_>| session.concluded(&bare, &found).verdict;
+        assert_eq!(verdict(usual), Verdict::Unexplained);
         let drifts = &claimed.model.judged.held_out;
-        assert_eq!(verdict(drifts), Verdict::NothingMissing);
+        assert_eq!(verdict(session(drifts)), Verdict::NothingMissing);
     }
 }

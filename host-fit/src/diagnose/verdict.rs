@@ -147,14 +147,9 @@ impl Session<'_> {
         best
     }
 
-    /// The verdict on `best` compared with the best model without effects.
-    pub(super) fn concluded(
-        &self,
-        best: &Hypothesis,
-        found: &Found,
-        as_given: &HeldOut,
-    ) -> Conclusion {
-        let bare = &found.bare;
+    /// The verdict on `best` compared with the best model without effects, which may be the given one.
+    pub(super) fn concluded(&self, best: &Hypothesis, found: &Found) -> Conclusion {
+        let (bare, as_given) = (&found.bare, self.as_given);
         let effects: Vec<&'static Spec> = best.terms.iter().filter_map(Term::effect).collect();
         let judge = self.judge();
         // If the given model has the smallest error, it is the result, and the verdict refers to it.
@@ -182,8 +177,13 @@ impl Session<'_> {
         let Some(certificate) = certificate else {
             return of_bare();
         };
-        let left = judge.excess(&best.judged.held_out)
-            / judge.excess(&bare.judged.held_out).max(f64::MIN_POSITIVE);
+        // The share is counted from the best model without these effects, which may be the given one.
+        let without = match as_given.rmse() < bare.judged.rmse() {
+            true => as_given,
+            false => &bare.judged.held_out,
+        };
+        let left =
+            judge.excess(&best.judged.held_out) / judge.excess(without).max(f64::MIN_POSITIVE);
         let taken = 1.0 - left;
         let fits = self.fits(&best.judged);
         let explained = match judge.noise_source {

@@ -145,7 +145,7 @@ fn follow(records: &mut [Record], beginnings: &[Beginning]) {
         return;
     }
     let learning: Vec<&Record> = records.iter().filter(|r| r.role == Use::Identify).collect();
-    let second = Baselines::fit(&learning).sopdt;
+    let second = Baselines::second_order(&learning);
     for (record, own) in records.iter_mut().zip(beginnings) {
         if own.follow == 0 {
             continue;

@@ -193,7 +193,7 @@ fn far_level(records: &[Record]) -> f64 {
 /// Residual of the response of a second-order plant with dead time, without its mean over each record, rms.
 pub(super) fn left_by_second_order(records: &[Record]) -> Option<f64> {
     let learning = || records.iter().filter(|r| r.role == Use::Identify);
-    let second = Baselines::fit(&learning().collect::<Vec<&Record>>()).sopdt?;
+    let second = Baselines::second_order(&learning().collect::<Vec<&Record>>())?;
     let (_, deviations) = left_by(&second, learning())?;
     Some(Noise::of(&deviations).within.sqrt())
 }
@@ -284,7 +284,7 @@ impl MovingZero {
         // Offsets bias the response from which they are estimated; each round removes most of the remaining bias.
         let (second, noise) = loop {
             let learning: Vec<&Record> = tared.iter().filter(|r| r.role == Use::Identify).collect();
-            let second = Baselines::fit(&learning).sopdt?;
+            let second = Baselines::second_order(&learning)?;
             let (means, deviations) = left_by(&second, tared.iter())?;
             let noise = Noise::of(&deviations);
             let falls = noise.dependence < RULES.memory_falls * last;

@@ -80,7 +80,7 @@ pub(super) fn second_order(
 ) -> Option<Hypothesis> {
     let first = root.judged.model();
     let period = first.sample_period_s;
-    let found = Baselines::fit(&judge.learning(0)).sopdt?;
+    let found = Baselines::second_order(&judge.learning(0))?;
     let linear = one_input(first, found.recursion(period));
     // Two lags in series, with the products of the first order; and the linear one, which may be underdamped.
     let in_series = found.time_constants_s.map(|[_, lag]| {

@@ -18,7 +18,7 @@ rules! {
     /// Smaller means are replaced by this when a change is taken relative to them.
     least_mean: f64 = 0.1, "y", "judgement: friction gains are of order one";
     /// A natural friction below this is a remainder of the initial transient and counts as 0.
-    no_natural: f64 = 1e-4, "share of the friction under steady blowing", "as settled as a mean is";
+    no_natural: f64 = 1e-4, "share of the friction under steady blowing", "equal to `settled`";
     /// A model whose largest pole modulus exceeds 1 by more than this is reported as unstable.
     grows: f64 = 3e-5, "", "e-folding in half a minute";
     /// A flow beyond this has diverged.
@@ -26,11 +26,11 @@ rules! {
 
     /// Delay tables cover flows up to this level.
     swing: f64 = 1.2, "times the friction under steady blowing", "judgement";
-    /// A pulse must exceed the dispersion of its edges by this to arrive in any case.
+    /// A pulse that is longer than the dispersion of its edges by at least this always arrives.
     sure_pulse: u32 = 3, "samples", "theory 3.2: k − h advances by 0 to 2 a sample";
     /// Standard deviation of the model error assumed in the observer. Smaller: the estimate follows the
     /// model; larger: it follows the noise.
-    model_error: f64 = 0.005, "share of what can be reached", "tuned on plants other than those of docs/law.md";
+    model_error: f64 = 0.005, "share of the reachable interval", "tuned on plants other than those of docs/law.md";
     /// Sensor noise averaged over 64 samples, if the rig's was not measured.
     usual_slow_noise: f64 = 0.025, "y", "a hot film: white 0.03, coloured 0.035 with 20 ms";
     /// Largest observer correction per sample.
@@ -52,9 +52,9 @@ rules! {
     /// The integral keeps at least this share of its rate, to follow drift.
     least_settled: f64 = 0.1, "share of its rate", "judgement";
     /// Largest correction of bias and integral.
-    correction: f64 = 0.3, "share of what can be reached", "judgement";
-    /// Switches that the budget can accumulate: with less than two pulses' worth, a valve that was open for
-    /// long would have to wait closed.
+    correction: f64 = 0.3, "share of the reachable interval", "judgement";
+    /// Switches that the budget can accumulate. With fewer than those of two pulses, a valve that was open for a
+    /// long time would have to stay closed until the budget recovers.
     saved_switches: u32 = 10, "switches", "five pulses";
     /// The shorter part of a paced cycle is held for this share of its duration, so that the budget limits
     /// the rate and not the hold time.
@@ -64,18 +64,18 @@ rules! {
     /// A slower switching rate is chosen if it saves at least this much air.
     worthwhile_saving: f64 = 0.01, "share of the air", "judgement";
     /// A slower switching rate is chosen only if the mean stays within this of the reference.
-    paced_offset: f64 = 0.005, "share of what can be reached", "judgement";
+    paced_offset: f64 = 0.005, "share of the reachable interval", "judgement";
     /// The air budget may be exceeded on the model by this.
     air_margin: f64 = 0.02, "share of the air of steady blowing", "judgement";
 
     /// Length of the run on the model that measures the air consumption.
     model_run: usize = 15_000, "samples", "judgement";
     /// Start of the scored part of that run.
-    model_run_from: usize = 5000, "samples", "judgement: the start is over";
+    model_run_from: usize = 5000, "samples", "judgement: the initial transient has decayed";
     /// Length of a trial in closed loop.
     trial: usize = 12_000, "samples", "judgement";
     /// Start of the scored part of a trial.
-    trial_from: usize = 4000, "samples", "judgement: the start is over";
+    trial_from: usize = 4000, "samples", "judgement: the initial transient has decayed";
     /// Window over which friction is averaged to decide whether attachment is lost.
     attached_mean: usize = WINDOW as usize, "samples", "the window of ỹ in eq. (1)";
     /// Attachment is lost if that average is below this share of the target, or of the level under steady
@@ -85,13 +85,13 @@ rules! {
     /// A plant is possible unless the one-sided p-value of the records is below this.
     not_excluded: f64 = 0.025, "p-value", "convention: the ends of intervals of 95 %";
     /// Steps, of a fifth each, in which the end of an interval is searched inwards from 1.96 standard errors.
-    interval_steps: u32 = 20, "", "judgement: to a seventieth";
+    interval_steps: u32 = 20, "", "judgement: the last step is at 1/70 of the distance";
     /// Gauss–Newton steps of the refit for a possible plant.
     refitting_steps: usize = 5, "", "judgement";
     /// Iterations of a fit with another delay law.
     law_iterations: usize = 10, "", "judgement";
     /// Smallest size of an effect that is tried.
-    smallest_size: f64 = 0.015_625, "share of its largest usual size", "judgement: a 64th";
+    smallest_size: f64 = 0.015_625, "share of its largest usual size", "judgement: 1/64";
     /// Number of sizes of an effect that are tried.
     sizes: usize = 9, "", "judgement: six doublings, three halvings";
     /// White sensor noise in trials on the model.
@@ -108,15 +108,15 @@ rules! {
     /// A law works on a plant if attachment is kept and the rms error is at most this.
     margin_rms: f64 = 2.0, "times that on the model", "convention";
     /// Runs with different noise per plant of the margin.
-    margin_runs: u32 = 2, "runs", "judgement: for the time it takes";
+    margin_runs: u32 = 2, "runs", "judgement: limits the time";
     /// Length of a run for the margin.
     margin_run: usize = 6000, "samples", "judgement";
     /// Start of the scored part of such a run.
-    margin_from: usize = 2000, "samples", "judgement: the start is over";
+    margin_from: usize = 2000, "samples", "judgement: the initial transient has decayed";
     /// Largest factor on delay, gain and time constants that is searched.
     margin_reach: f64 = 4.0, "", "judgement";
     /// Rays in each plane of two errors, a multiple of four.
-    margin_rays: u32 = 12, "", "judgement: for the time it takes";
+    margin_rays: u32 = 12, "", "judgement: limits the time";
     /// Bisections along each ray.
     margin_bisections: u32 = 5, "", "to 4 % of a factor of 4 either way";
 
@@ -151,9 +151,9 @@ rules! {
     distinct_duty: f64 = 0.1, "", "judgement";
 
     /// Most switching opportunities in a horizon.
-    blocks: u32 = 60, "", "judgement: for the time it takes";
+    blocks: u32 = 60, "", "judgement: limits the time";
     /// Beam width: commands kept per switching opportunity.
-    beam: usize = 16, "", "judgement: for the time it takes";
+    beam: usize = 16, "", "judgement: limits the time";
     /// Replanning instants per horizon of a receding-horizon law, because the end of a plan ignores what
     /// follows.
     plans: u32 = 3, "plans", "judgement";

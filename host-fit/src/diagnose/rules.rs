@@ -15,7 +15,7 @@ rules! {
     /// Family-wise level: the e-value must be at least the inverse of this.
     level_of_search: f64 = 0.02, "p-value", "target: at most 3 % false names";
     /// At a known noise level an effect is left out, or replaced by lags, if the validation error rises by no more than this
-    /// fraction.
+    /// fraction. At an unknown one, effects are not missing in a given model whose error is larger by no more than this.
     worthwhile: f64 = 0.015, "share of the rms error", "cases without an effect in six families: noise alone \
          reaches 0.01";
     /// Validation errors that differ by less than this are equal in practice.

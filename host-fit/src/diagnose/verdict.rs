@@ -165,8 +165,13 @@ impl Session<'_> {
             effects: Vec::new(),
             p_value: None,
         };
-        // Effects on a base model with a larger error than the given model explain nothing.
-        let no_better = best.judged.rmse() >= as_given.rmse();
+        // Effects on a base model with a larger error than the given model explain nothing. If the noise level is
+        // unknown, no effect is missing in a given model whose error is as small in practice.
+        let margin = match judge.noise_source {
+            NoiseSource::Scatter => RULES.worthwhile,
+            NoiseSource::Measured | NoiseSource::Repeats => 0.0,
+        };
+        let no_better = (1.0 + margin) * best.judged.rmse() >= as_given.rmse();
         if effects.is_empty() || no_better {
             return of_bare();
         }

@@ -290,6 +290,7 @@ fn read(path: &Path) -> Record {
 /// FIT in percent on the records `judged`, after fitting to `learned`.
 fn fits(learned: &[&Record], judged: &[&Record]) -> (Baselines, BaselineFits) {
     let found = Baselines::fit(learned);
+    assert_eq!(Baselines::second_order(learned), found.sopdt);
     let fits = found.fit_percent(&all(judged));
     (found, fits)
 }

@@ -112,6 +112,16 @@ impl Session<'_> {
         self.certificate(subject, &nulls, found)
     }
 
+    /// The certificate of `subject` against `without` alone.
+    pub(super) fn certified_over(
+        &self,
+        subject: &Hypothesis,
+        without: &Hypothesis,
+        found: &Found,
+    ) -> Option<Certificate> {
+        self.certificate(subject, &[self.null(without)?], found)
+    }
+
     /// The given model as a null model, unless it has one of these effects or diverges.
     fn given_without(&self, effects: &[&str]) -> Option<Null> {
         if effects.iter().any(|name| self.given.has_effect(name)) {

@@ -167,7 +167,7 @@ impl Session<'_> {
                 other.name != rival.name && alike(&a.held_out, &b.held_out)
             });
             let refitted = rival.refitted.as_ref();
-            let certificate = refitted.and_then(|with| self.certified(with, context, found));
+            let certificate = refitted.and_then(|with| self.certified_over(with, context, found));
             let p_value = certificate.as_ref().map_or(1.0, Certificate::p_value);
             Ranked {
                 effect: rival.name.clone(),

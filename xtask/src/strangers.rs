@@ -21,12 +21,13 @@ free run. ARX: ARX(2,2). *edges* is the mean delay that `delay` measures, in sam
 
 ";
 /// The drawn sets of the page.
-const DRAWN: [&str; 4] = ["--drawn", "320", "--seed", "2026"];
+const DRAWN: [&str; 4] = ["--drawn", "420", "--seed", "2027"];
 const DRAWN_HEAD: &str = "
 ## Drawn from a seed
 
-`cargo xtask strangers --drawn 320 --seed 2026`: records of linear plants with one to three lags and a dead time, written
-in the formats of different loggers; twenty records of each of sixteen kinds. A case is right if all of these hold:
+`cargo xtask strangers --drawn 420 --seed 2027`: records of linear plants with a dead time and one to three lags, a
+resonance or an integrator, written in the formats of different loggers; twenty records of each of 21 kinds. A case is
+right if all of these hold:
 
 - no effect is named that the plant does not have, and another input that drives y is named;
 - the interval of the dead time contains the true one;

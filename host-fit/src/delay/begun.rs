@@ -26,12 +26,13 @@ impl Begun {
     /// `answers` is the longest response time to a command before the record, samples.
     fn of(record: &Record, prepared: &Record, answers: usize) -> Self {
         let whole = Record {
+            u: prepared.u.clone(),
             u_before: prepared.u_before,
             // Slower responses are part of the plant's free initial state.
             followed: first_of(&prepared.followed, answers),
             ..record.clone()
         };
-        let first = record.u.first().copied();
+        let first = whole.u.first().copied();
         let inferred = record.u_before.is_none() && whole.u_before != first;
         let is_shown = whole.u.iter().any(|u| Some(*u) != first);
         let shown = (inferred && is_shown).then(|| Record {

@@ -11,7 +11,7 @@
 //! too. The prior is one half for the first order and a quarter each for the second and the third. The interval is
 //! that of the mixture, from 2.5 to 97.5 %.
 
-use super::linear::{Evaluation, Free, Refined, Series, refine};
+use super::linear::{Evaluation, Free, LARGEST_RATIO, Refined, Series, refine};
 use super::plant::Plant;
 use super::rules::RULES;
 use super::spread::spread;
@@ -78,22 +78,23 @@ struct Component {
     sd: f64,
 }
 
+/// Autocorrelation of neighbouring residuals, from 0 to the largest that is corrected for.
+pub(crate) fn correlation_of_neighbours(at: &Evaluation) -> f64 {
+    let pairs = at.residuals.iter().flat_map(|r| r.windows(2));
+    let lagged: f64 = pairs.map(|w| w[0] * w[1]).sum();
+    let square: f64 = at.residuals.iter().map(|r| dot(r, r)).sum();
+    if square > 0.0 {
+        (lagged / square).clamp(0.0, RULES.slowest_disturbance)
+    } else {
+        0.0
+    }
+}
+
 /// The variance of the residual, inflated for its autocorrelation.
 pub(crate) fn widened_variance(at: &Evaluation) -> f64 {
     let samples: usize = at.residuals.iter().map(Vec::len).sum();
     let free = samples.saturating_sub(3 + 3 * at.residuals.len()).max(1) as f64;
-    let lagged: f64 = at
-        .residuals
-        .iter()
-        .flat_map(|r| r.windows(2))
-        .map(|w| w[0] * w[1])
-        .sum();
-    let square: f64 = at.residuals.iter().map(|r| dot(r, r)).sum();
-    let rho = if square > 0.0 {
-        (lagged / square).clamp(0.0, RULES.slowest_disturbance)
-    } else {
-        0.0
-    };
+    let rho = correlation_of_neighbours(at);
     // Data without noise still have rounding errors.
     at.rss / free * (1.0 + rho) / (1.0 - rho) + f64::MIN_POSITIVE
 }
@@ -175,20 +176,19 @@ pub(crate) fn dead_time(
     let noise = widened_variance(&best.at);
     // h, ln S and the further parameters that are integrated.
     let component = |fit: &Refined, integrated: usize, log_prior: f64| -> Option<Component> {
-        let inverse = fit.inverse.as_ref()?;
-        let stride = inverse.len().isqrt();
+        let covariance = fit.covariance(noise)?;
+        let stride = covariance.len().isqrt();
         let size = 2 + integrated;
         let block: Option<Vec<f64>> = (0..size * size)
-            .map(|i| inverse.get(i / size * stride + i % size).copied())
+            .map(|i| covariance.get(i / size * stride + i % size).copied())
             .collect();
         let block = block?;
         let log_volume = 0.5 * log_determinant(&block, size)
-            + 0.5 * size as f64 * noise.ln()
             + 0.5 * integrated as f64 * std::f64::consts::TAU.ln();
         Some(Component {
             log_weight: log_prior + log_volume - (fit.at.rss - best.at.rss) / (2.0 * noise),
             mean: fit.at.plant.mean_delay(),
-            sd: (block.first()? * noise).sqrt(),
+            sd: block.first()?.sqrt(),
         })
     };
     let first = fits.first()?;
@@ -201,11 +201,10 @@ pub(crate) fn dead_time(
     let (centre, step) = match second {
         Some(second) => {
             let ratio = second.at.plant.ratio.max(0.005);
-            let variance = second.inverse.as_ref().and_then(|i| {
-                let stride = i.len().isqrt();
-                i.get(2 * stride + 2).copied()
-            });
-            let sd = variance.map_or(f64::INFINITY, |v| (v * noise).sqrt());
+            let covariance = second.covariance(noise).unwrap_or_default();
+            let stride = covariance.len().isqrt();
+            let variance = covariance.get(2 * stride + 2);
+            let sd = variance.map_or(f64::INFINITY, |v| v.sqrt());
             (ratio, (0.75 * sd / ratio).clamp(0.004, 0.3))
         }
         None => (0.01, 0.3),
@@ -217,7 +216,7 @@ pub(crate) fn dead_time(
         let mut at = start;
         for i in usize::from(direction < 0.0)..=RULES.ratios {
             let ratio = centre * (direction * step * i as f64).exp();
-            if !(0.002..=6.0).contains(&ratio) {
+            if !(0.002..=LARGEST_RATIO).contains(&ratio) {
                 break;
             }
             let from = Plant { ratio, ..at };

@@ -382,3 +382,81 @@ fn nothing_that_moves_gives_edges_without_a_dead_time() {
     let noisy = study(vec![Record::new("r", Use::Identify, 1.0, u, noise)]);
     assert!(noisy.dead_time.is_none(), "{:?}", noisy.dead_time);
 }
+
+/// A command of 2000 samples that is held for 30 to 170, and a normal deviate for each sample.
+fn switched(seed: u64) -> (Vec<f64>, Vec<f64>) {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let (mut u, mut level) = (vec![0.0; 60], 0.0);
+    while u.len() < 2000 {
+        level = 1.0 - level;
+        u.extend(std::iter::repeat_n(level, rng.random_range(30..170)));
+    }
+    u.truncate(2000);
+    let deviates = (0..2000).map(|_| StandardNormal.sample(&mut rng)).collect();
+    (u, deviates)
+}
+
+/// Asserts that the dead time of each of six records lies within its interval, which is no longer than `longest`.
+fn all_within(delay: f64, longest: f64, y: impl Fn(&[f64], &[f64]) -> Vec<f64>) {
+    for seed in 0..6 {
+        let (u, deviates) = switched(seed);
+        let y = y(&u, &deviates);
+        let study = study(vec![Record::new("r", Use::Identify, 0.1, u, y)]);
+        let found = study.dead_time.expect("y responds");
+        let holds = found.low <= delay && delay <= found.high;
+        assert!(
+            holds && found.high - found.low < longest,
+            "seed {seed}, {delay}: {found:?}"
+        );
+    }
+}
+
+fn with_noise(y: Vec<f64>, deviates: &[f64]) -> Vec<f64> {
+    y.iter().zip(deviates).map(|(y, z)| y + 0.01 * z).collect()
+}
+
+#[test]
+fn a_slow_disturbance_does_not_hide_the_dead_time() {
+    all_within(8.0, 5.0, |u, deviates| {
+        let (mut walk, mut room) = (0.0, 0.0);
+        let y = with_noise(respond(30.0, 0.0, 8.0, u, [0.0; 2]), deviates);
+        y.into_iter()
+            .zip(deviates.iter().rev())
+            .map(|(y, z)| {
+                walk += z;
+                room += (walk - room) / 200.0;
+                y + 0.006 * room
+            })
+            .collect()
+    });
+}
+
+#[test]
+fn single_wrong_readings_do_not_hide_the_dead_time() {
+    all_within(8.0, 16.0, |u, deviates| {
+        let y = with_noise(respond(30.0, 6.0, 8.0, u, [0.0; 2]), deviates);
+        let wrong = |(k, y): (usize, f64)| y + if k % 211 == 100 { 1.4 } else { 0.0 };
+        y.into_iter().enumerate().map(wrong).collect()
+    });
+}
+
+#[test]
+fn a_response_faster_than_the_samples_has_a_dead_time_of_few() {
+    all_within(2.0, 6.0, |u, deviates| {
+        with_noise(respond(0.2, 0.0, 2.0, u, [0.0; 2]), deviates)
+    });
+}
+
+#[test]
+fn an_integrator_has_a_dead_time() {
+    all_within(8.0, 40.0, |u, deviates| {
+        let mut level = 0.0;
+        let flow = respond(15.0, 0.0, 8.0, u, [0.0; 2]).into_iter();
+        let tank = flow.map(|flow| {
+            let before = level;
+            level += (flow - 0.5) / 40.0;
+            before
+        });
+        with_noise(tank.collect(), deviates)
+    });
+}

@@ -121,14 +121,14 @@ impl DelayLawFit {
         let (change, standard_error) = self.change();
         let range = format!("ỹ from {:.3} to {:.3}", self.range.0, self.range.1);
         if least.is_nan() || least < 0.0 {
-            return Some(format!(
-                "it is {least:.1} samples at a ỹ within these data, but a delay cannot be negative"
-            ));
+            return Some(
+                "it is negative at a ỹ within these data, but a delay cannot be negative"
+                    .to_owned(),
+            );
         }
         if most > longest {
             return Some(format!(
-                "it is {most:.3e} samples at a ỹ within these data, but delays were searched up to \
-                {longest:.0}"
+                "at a ỹ within these data it is longer than {longest:.0} samples, the longest that was searched"
             ));
         }
         let error = self.quantile * standard_error;

@@ -8,6 +8,7 @@
 
 use super::plant::{Plant, Switching};
 use super::spread::mean;
+use super::white::without_outliers;
 use crate::data::Record;
 use crate::linalg::{dot, dots, gram, solve_symmetric};
 use crate::order;
@@ -20,10 +21,13 @@ const COARSE_STEP: f64 = 1.5;
 const COARSE_RATIOS: [f64; 2] = [0.0, 0.2];
 /// Number of grid minima, over the time constants, that are refined.
 const COARSE_STARTS: usize = 3;
-/// Largest ratio: damping ratio 0.2.
-const LARGEST_RATIO: f64 = 6.0;
+/// Largest ratio: damping ratio 0.05.
+pub(crate) const LARGEST_RATIO: f64 = 100.0;
 /// Ratios from which a second order starts.
 const STARTS: [f64; 3] = [0.02, 0.1, 0.25];
+/// Prior standard deviations of ln S and b around the fit: its linearisation holds within a factor e of S and over the
+/// ratios of two lags in series.
+const SCALES: [f64; 2] = [1.0, 0.15];
 /// Steps of Levenberg–Marquardt.
 const STEPS: usize = 40;
 
@@ -36,6 +40,8 @@ pub(crate) struct Series {
     pub(crate) switching: Switching,
     /// The first used sample: earlier ones respond to commands before the record.
     pub(crate) from: usize,
+    /// ρ of the filter 1 − ρ·z⁻¹ that y has passed, and that responses pass before they are compared with it.
+    pub(crate) whitening: f64,
 }
 
 impl Series {
@@ -44,18 +50,35 @@ impl Series {
         let first = record.u.first().copied().unwrap_or(0.0);
         let before = record.u_before.unwrap_or(first);
         let from = record.followed.len().min(record.len());
-        let level = mean(&record.y[from..]);
-        let counted = record.y[from..].iter().map(|y| y - level);
+        let counted = without_outliers(&record.y[from..]);
+        let level = mean(&counted);
+        let counted = counted.iter().map(|y| y - level);
         Self {
             y: std::iter::repeat_n(0.0, from).chain(counted).collect(),
             switching: Switching::of(&record.u, before, middle),
             from,
+            whitening: 0.0,
         }
     }
 
-    /// Sets unused samples to 0.
+    /// Filters values as y is, and sets unused samples to 0.
     fn counted(&self, values: &mut [f64]) {
-        values.iter_mut().take(self.from).for_each(|v| *v = 0.0);
+        prewhiten(values, self.whitening);
+        // The first sample has no predecessor.
+        let unused = self.from + usize::from(self.whitening > 0.0);
+        values.iter_mut().take(unused).for_each(|v| *v = 0.0);
+    }
+
+    /// The same for a disturbance of y with this correlation of neighbouring samples: y and the responses are
+    /// prewhitened.
+    pub(crate) fn whitened(&self, correlation: f64) -> Self {
+        let mut whitened = Self {
+            whitening: correlation,
+            ..self.clone()
+        };
+        let mut y = std::mem::take(&mut whitened.y);
+        whitened.counted(&mut y);
+        Self { y, ..whitened }
     }
 
     /// Decimated by means over `factor` samples, each at the middle of its block.
@@ -72,6 +95,7 @@ impl Series {
             y: self.y.chunks_exact(factor).map(mean).collect(),
             switching,
             from: self.from.div_ceil(factor),
+            ..*self
         }
     }
 
@@ -86,6 +110,7 @@ impl Series {
             y: self.y.iter().step_by(factor).copied().collect(),
             switching,
             from: self.from.div_ceil(factor),
+            ..*self
         }
     }
 
@@ -132,6 +157,15 @@ impl Series {
     /// Projects level and free responses out of `values` (one per sample of the record).
     pub(crate) fn without_nuisance(&self, plant: &Plant, values: &mut [f64]) {
         remove(&self.basis(plant), values);
+    }
+}
+
+/// Filters values by 1 − ρ·z⁻¹; before them they are 0.
+pub(crate) fn prewhiten(values: &mut [f64], correlation: f64) {
+    if correlation > 0.0 {
+        for k in (1..values.len()).rev() {
+            values[k] -= correlation * values[k - 1];
+        }
     }
 }
 
@@ -320,9 +354,32 @@ impl Free {
 pub(crate) struct Refined {
     /// The fit.
     pub(crate) at: Evaluation,
-    /// (JᵀJ)⁻¹ over h, ln S, b where it was free, and the differences; the variance of h is element `[0]`
-    /// times the residual variance.
-    pub(crate) inverse: Option<Vec<f64>>,
+    /// JᵀJ over the free parameters, row by row.
+    information: Vec<f64>,
+    /// Those parameters.
+    free: Free,
+}
+
+impl Refined {
+    /// The covariance of the free parameters for a residual variance, with the priors of [`SCALES`]. Without them a
+    /// parameter that has no effect at the fit, such as b of a vanishing second lag, makes the interval of h infinite.
+    pub(crate) fn covariance(&self, noise: f64) -> Option<Vec<f64>> {
+        let axes = self.free.axes();
+        let size = axes.len();
+        // A response that is shifted by more than its own length is another one.
+        let shift = 1.0 + self.at.plant.mean_sum();
+        let [sum, ratio] = SCALES;
+        let scales = [shift, sum, ratio, shift, sum];
+        let mut precision: Vec<f64> = self.information.iter().map(|v| v / noise).collect();
+        for (place, axis) in axes.iter().enumerate() {
+            precision[place * size + place] += scales[*axis].powi(-2);
+        }
+        let columns = (0..size).map(|axis| {
+            let unit: Vec<f64> = (0..size).map(|i| f64::from(u8::from(i == axis))).collect();
+            solve_symmetric(&precision, &unit)
+        });
+        Some(columns.collect::<Option<Vec<_>>>()?.concat())
+    }
 }
 
 /// Levenberg–Marquardt over the free parameters.
@@ -354,7 +411,7 @@ pub(crate) fn refine(
     };
     let mut at = evaluate(series, start)?;
     let mut damping = 1e-3;
-    let mut inverse = None;
+    let mut information = Vec::new();
     for step in 0..STEPS {
         let plant = at.plant;
         // Steps of the difference quotients; backward differences near a bound.
@@ -390,7 +447,7 @@ pub(crate) fn refine(
         let columns: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
         let right = dots(&flat, columns.iter().copied());
         let products = gram(&columns);
-        inverse = invert(&products, size);
+        information.clone_from(&products);
         if step + 1 == STEPS {
             break;
         }
@@ -416,17 +473,11 @@ pub(crate) fn refine(
             break;
         }
     }
-    Some(Refined { at, inverse })
-}
-
-/// The inverse of a small symmetric matrix.
-fn invert(gram: &[f64], size: usize) -> Option<Vec<f64>> {
-    let mut inverse = Vec::with_capacity(size * size);
-    for axis in 0..size {
-        let unit: Vec<f64> = (0..size).map(|i| f64::from(u8::from(i == axis))).collect();
-        inverse.extend(solve_symmetric(gram, &unit)?);
-    }
-    Some(inverse)
+    Some(Refined {
+        at,
+        information,
+        free,
+    })
 }
 
 /// The best first-order plant, and the best second-order one if it is better, from the `starts` of

@@ -6,7 +6,7 @@
 //! edges. The time constants are searched in the windows too: to a plant with one dead time, dead times that differ
 //! between edges look like a second time constant.
 
-use super::linear::{Series, evaluate};
+use super::linear::{Series, evaluate, prewhiten};
 use super::onset::Unmeasured;
 use super::plant::{Change, Plant, Switching};
 use super::pooled::Pooled;
@@ -113,6 +113,7 @@ fn shifted(
         };
         let mut out = vec![0.0; window.len()];
         steady.respond(&edge, &mut out);
+        prewhiten(&mut out, series.whitening);
         out
     };
     let own = respond(0.0);
@@ -239,6 +240,7 @@ impl<'a> Window<'a> {
                 on: !self.change.on,
             },
             from: 0,
+            whitening: 0.0,
         };
         let here = Plant {
             delay: [0.0; 2],

@@ -23,6 +23,7 @@ mod rules;
 mod spread;
 mod study;
 mod verdict;
+mod white;
 
 pub use dead_time::DeadTime;
 pub use drawing::draw_delays;

@@ -1,9 +1,12 @@
 //! Fit to all edges of all records: time scales, command before each record, one plant, one dead time.
 
-use super::dead_time::{DeadTime, dead_time, widened_variance};
+use super::dead_time::{DeadTime, correlation_of_neighbours, dead_time, widened_variance};
 use super::linear::{Free, Refined, Series, coarse, evaluate, fit, refine};
+use super::local::by_trajectory;
 use super::plant::Plant;
 use super::rules::RULES;
+use super::spread::spread;
+use super::white::white_noise;
 use crate::data::Record;
 use crate::linalg::dot;
 
@@ -29,6 +32,8 @@ pub(crate) struct Pooled {
     pub(crate) responds: bool,
     /// The longest delay that is searched, samples.
     pub(crate) max_delay: f64,
+    /// Correlation of neighbouring samples of the disturbance for which records are prewhitened.
+    pub(crate) whitening: f64,
 }
 
 /// The levels of a command: smallest and largest over all records.
@@ -61,23 +66,6 @@ pub(crate) fn spacing(records: &[&Record]) -> usize {
     *times.select_nth_unstable(middle).1
 }
 
-/// Variance of white noise in some records, from the median of the squared second differences of y, to which
-/// responses contribute only in few samples.
-fn white_noise(records: &[&Record]) -> f64 {
-    let mut squares: Vec<f64> = records
-        .iter()
-        .flat_map(|r| r.y.windows(3))
-        .map(|w| (w[0] - 2.0 * w[1] + w[2]).powi(2) / 6.0)
-        .collect();
-    let middle = squares.len() / 2;
-    if squares.is_empty() {
-        return 0.0;
-    }
-    // The median of a squared normal deviate is 0.455 of its variance.
-    let median = *squares.select_nth_unstable_by(middle, f64::total_cmp).1;
-    median / 0.455
-}
-
 impl Pooled {
     /// Fits one plant to `records`. `None` where the command never changes.
     pub(crate) fn of(records: &[&Record], max_delay: Option<usize>) -> Option<Self> {
@@ -103,26 +91,63 @@ impl Pooled {
         let scale = factor as f64;
         let picked: Vec<Series> = all.iter().map(|s| s.picked(factor)).collect();
         let starts: Vec<Plant> = starts.iter().map(|p| p.slower(1.0 / scale)).collect();
-        let fits = fit(&picked, &starts, max_delay / scale);
-        let (fits, free) = with_directions(&picked, fits, max_delay / scale);
-        let (estimate, chosen) =
-            dead_time(&picked, &fits, free, max_delay / scale, RULES.clock / scale)?;
-        let at = evaluate(&all, fits.get(chosen)?.at.plant.slower(scale))?;
-        let noise = widened_variance(&at);
-        let spread = all.iter().map(|s| dot(&s.y, &s.y)).sum::<f64>() / samples.max(1) as f64;
-        let left = at.rss / samples.max(1) as f64;
-        Some(Self {
-            range,
-            plant: at.plant,
-            gain: at.gain,
-            dead_time: estimate.scaled(scale),
-            noise,
-            responds: at.explained > RULES.detection * noise,
-            max_delay,
-            describes: left
-                <= RULES.noise_allowed.powi(2) * white_noise(records)
-                    + RULES.plant_fits.powi(2) * spread,
-        })
+        let white = white_noise(records.iter().map(|record| record.y.as_slice()));
+        let fitted = |picked: &[Series], starts: &[Plant], correlation: f64| {
+            let fits = fit(picked, starts, max_delay / scale);
+            let (fits, free) = with_directions(picked, fits, max_delay / scale);
+            let clock = RULES.clock / scale;
+            let (estimate, chosen) = dead_time(picked, &fits, free, max_delay / scale, clock)?;
+            let fit = &fits.get(chosen)?.at;
+            let plant = fit.plant.slower(scale);
+            Some(Fitted {
+                estimate: estimate.scaled(scale),
+                describes: describes(&all, plant, white, correlation)?,
+                correlation: correlation_of_neighbours(fit),
+                plant,
+            })
+        };
+        let pooled = |fitted: Fitted, correlation: f64| {
+            let whitened: Vec<Series> = all.iter().map(|s| s.whitened(correlation)).collect();
+            let at = evaluate(&whitened, fitted.plant)?;
+            let noise = widened_variance(&at);
+            Some(Self {
+                range,
+                plant: at.plant,
+                gain: at.gain,
+                dead_time: fitted.estimate,
+                noise,
+                responds: at.explained > RULES.detection * noise,
+                max_delay,
+                describes: fitted.describes,
+                whitening: correlation,
+            })
+        };
+        let found = fitted(&picked, &starts, 0.0)?;
+        // A slow disturbance, such as the temperature of a room, hides the responses unless they are prewhitened.
+        if !found.describes && found.correlation > 0.0 {
+            let whitened = picked.iter().map(|s| s.whitened(found.correlation));
+            let whitened: Vec<Series> = whitened.collect();
+            let own = correlation_of_neighbours(&evaluate(&all, found.plant)?);
+            let better = fitted(&whitened, &starts, own)
+                .filter(|better| better.describes)
+                .and_then(|better| pooled(better, own))
+                .filter(|better| better.has_one_dead_time(&all));
+            if better.is_some() {
+                return better;
+            }
+        }
+        pooled(found, 0.0)
+    }
+
+    /// Whether the dead times of single edges scatter by no more than their errors explain, and most are measured.
+    fn has_one_dead_time(&self, all: &[Series]) -> bool {
+        let series = all.iter().map(|s| s.whitened(self.whitening));
+        let edges: Vec<_> = series.flat_map(|s| by_trajectory(&s, self)).collect();
+        let known: Vec<_> = edges.iter().flatten().collect();
+        let delays: Vec<f64> = known.iter().map(|edge| edge.delay).collect();
+        let square: f64 = known.iter().map(|edge| edge.standard_error.powi(2)).sum();
+        let expected = (square / known.len().max(1) as f64).sqrt();
+        2 * known.len() > edges.len() && spread(&delays).sd <= RULES.scatter_allowed * expected
     }
 
     /// Middle of the range of u: above it the command is on.
@@ -130,10 +155,30 @@ impl Pooled {
         f64::midpoint(self.range.0, self.range.1)
     }
 
-    /// A record with the command before it.
+    /// A record with the command before it, prewhitened.
     pub(crate) fn series(&self, record: &Record) -> Series {
-        Series::new(record, self.middle())
+        Series::new(record, self.middle()).whitened(self.whitening)
     }
+}
+
+/// One plant fitted to the records.
+struct Fitted {
+    estimate: DeadTime,
+    describes: bool,
+    /// Correlation of neighbouring residuals of the fit.
+    correlation: f64,
+    plant: Plant,
+}
+
+/// Whether the residual of a plant is close to the noise, after prewhitening for a disturbance with this `correlation`
+/// of neighbouring samples. `None` if the command has no influence.
+fn describes(all: &[Series], plant: Plant, white: f64, correlation: f64) -> Option<bool> {
+    let whitened: Vec<Series> = all.iter().map(|s| s.whitened(correlation)).collect();
+    let at = evaluate(&whitened, plant)?;
+    let samples: usize = whitened.iter().map(|s| s.y.len()).sum();
+    let square: f64 = whitened.iter().map(|s| dot(&s.y, &s.y)).sum();
+    let noise = white * (1.0 + correlation * correlation) * samples as f64;
+    Some(at.rss <= RULES.noise_allowed.powi(2) * noise + RULES.plant_fits.powi(2) * square)
 }
 
 /// The longest delay that the records can show, samples: from the first change of the command to their end.

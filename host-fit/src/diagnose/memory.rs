@@ -66,6 +66,8 @@ pub(super) fn memory(model: &Model) -> Vec<Memory> {
             }
         })
         .chain(wakes)
+        // An integrator has no rate to weigh by.
+        .filter(|memory| memory.weight.is_finite() && memory.weight_blown.is_finite())
         .collect()
 }
 
@@ -109,6 +111,11 @@ mod tests {
             panic!("{found:?}")
         };
         assert!((one.weight + 0.38).abs() < 1e-9, "{one:?}");
+    }
+
+    #[test]
+    fn an_integrator_has_no_rate_to_weigh_by() {
+        assert_eq!(memory(&model(&[(1, 1.0), (31, 0.0)], &[])), []);
     }
 
     #[test]

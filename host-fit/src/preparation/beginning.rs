@@ -247,9 +247,9 @@ impl Beginning {
     /// Re-examines rests that are too short to be certain. If records rest at different levels under the same
     /// command, or if one rests away from the level where the response to its command ends, a response is still in
     /// progress. Records with a rest shorter than a motion then begin in mid-run, with two exceptions. The first is
-    /// a rest of at least a time constant that is too still for a response in progress: its offset has changed. The
-    /// second is a group of at least three rests, more than half of all, at the level of their median within the
-    /// noise; two rests could agree accidentally.
+    /// a rest of at least a time constant beyond the dead time that is too still for a response in progress: its offset
+    /// has changed. The second is a group of at least three rests, more than half of all, at the level of their median
+    /// within the noise; two rests could agree accidentally.
     pub(super) fn reconcile(beginnings: &mut [Self], records: &[Record], reference: &FirstOrder) {
         let time = reference.time_constant;
         let times = [0.5, 1.0, 2.0].map(|factor| factor * time);
@@ -282,7 +282,11 @@ impl Beginning {
             };
             let (same, middle) = under(*command);
             let ends = [middle.level, reference.at_rest(*command)];
-            let is_settled = |rest: &Rest, y: &[f64]| {
+            // Within a dead time y can still be where an earlier command has brought it.
+            let dead_time = reference.dead_time.ceil() as usize;
+            let is_settled = |y: &[f64]| {
+                let y = y.get(dead_time..).unwrap_or_default();
+                let rest = Rest::of(y);
                 let long = |times: f64| y.len() as f64 >= times * time;
                 let still = || ends.iter().all(|end| rest.is_settled(y, *end, times));
                 long(RULES.times_of_rest) || (long(1.0) && still())
@@ -292,7 +296,7 @@ impl Beginning {
                 .filter(|(other, _)| other.is_at_level_of(&middle))
                 .count();
             let with_most = rest.is_at_level_of(&middle) && alike >= 3 && 2 * alike > same.len();
-            let unsettled = same.iter().filter(|(rest, y)| !is_settled(rest, y));
+            let unsettled = same.iter().filter(|(_, y)| !is_settled(y));
             let levels = unsettled.map(|(rest, _)| rest.level);
             let [low, high] = levels.fold([middle.level; 2], |[low, high], level| {
                 [low.min(level), high.max(level)]
@@ -301,7 +305,7 @@ impl Beginning {
             let from_end = (rest.level - reference.at_rest(*command)).abs();
             let is_elsewhere = alone && from_end > apart + 3.0 * reference.left_rms;
             let on_its_way = high - low > apart || is_elsewhere;
-            if !is_settled(rest, y) && on_its_way && !with_most {
+            if !is_settled(y) && on_its_way && !with_most {
                 *own = Self::in_mid_run(record, own.command, reference.dead_time, time);
             }
         }

@@ -9,6 +9,7 @@ mod command;
 mod levels;
 mod reference;
 mod rest;
+mod row;
 mod rules;
 mod smoothing;
 
@@ -39,6 +40,8 @@ pub struct Preparation {
     pub at_rest: bool,
     /// The offset that differs between records, if it does.
     pub moving_zero: Option<MovingZero>,
+    /// Whether y responds to the command of its own row; u of `records` is then moved up by one row.
+    pub own_row: bool,
     /// The first-order response on which these decisions are based; `None` if u and y are unrelated.
     pub reference: Option<FirstOrder>,
 }
@@ -47,6 +50,17 @@ impl Preparation {
     /// Prepares `records`; what their files state about the beginning is not changed.
     #[must_use]
     pub fn of(records: &[Record]) -> Self {
+        if let Some(moved) = row::in_own_row(records) {
+            return Self {
+                own_row: true,
+                ..Self::of_rows(&moved)
+            };
+        }
+        Self::of_rows(records)
+    }
+
+    /// Prepares `records` in which u_k acts from y_{k+1} on.
+    fn of_rows(records: &[Record]) -> Self {
         let prepared = Self::as_read(records);
         if prepared.moving_zero.is_some() {
             return prepared;
@@ -98,6 +112,7 @@ impl Preparation {
             command,
             zero,
             moving_zero,
+            own_row: false,
             reference,
         }
     }
@@ -124,6 +139,13 @@ impl Preparation {
                 crate::picture::significant(first.lead as f64 * first.sample_period_s, 3)
             );
             remarks.push(text);
+        }
+        if self.own_row {
+            remarks.push(
+                "y responds to the command of its own row: the command is read one row earlier, as on the \
+                 board, where y is read before the command is set."
+                    .to_owned(),
+            );
         }
         if self.command.off != 0.0 {
             remarks.push(format!(

@@ -82,6 +82,28 @@ impl<'a> Rests<'a> {
         self.rests.iter().map(|(_, y)| mean(y)).collect()
     }
 
+    /// Whether the levels of the rests are nearer to those of whole records, around a second-order response with one
+    /// level, than a common level is. Records with y_sd, of flows as a rule, have no such response.
+    fn agree_with_responses(&self) -> bool {
+        let records = || self.rests.iter().map(|(record, _)| *record);
+        if records().any(|record| record.y_sd.is_some()) {
+            return true;
+        }
+        let learning: Vec<&Record> = records().filter(|r| r.role == Use::Identify).collect();
+        let second = Baselines::second_order(&learning);
+        let Some((means, _)) = second.and_then(|second| left_by(&second, records())) else {
+            return true;
+        };
+        let centred = |values: &[f64]| -> Vec<f64> {
+            let common = mean(values);
+            values.iter().map(|value| value - common).collect()
+        };
+        let (levels, means) = (centred(&self.levels()), centred(&means));
+        // Σ (m − z)² < Σ m².
+        let nearer = levels.iter().zip(&means).map(|(z, m)| z * (z - 2.0 * m));
+        nearer.sum::<f64>() < 0.0
+    }
+
     /// Samples of each rest.
     fn lengths(&self) -> Vec<usize> {
         self.rests.iter().map(|(_, y)| y.len()).collect()
@@ -214,8 +236,8 @@ pub struct MovingZero {
 }
 
 impl MovingZero {
-    /// Whether records rest at different levels under a command of `off`. The difference must be significant and
-    /// larger than slow noise explains. Half of that suffices if the levels drift from record to record with a
+    /// Whether records rest at different levels under a command of `off`. The difference must be significant, larger
+    /// than slow noise explains, and agree with the responses through whole records. Half of that suffices if the levels drift from record to record with a
     /// significant order. `left` gives the rms residual of the reference responses within records; it is used if
     /// y_sd is not stated.
     pub(super) fn of(
@@ -239,7 +261,8 @@ impl MovingZero {
         let certain = apart_by(1.0) || (creeps(&levels) && apart_by(RULES.creeping_share));
         let slower = if certain { 0.0 } else { noise.slower.powi(2) };
         let (p, zeros) = between(&rests.noise, &levels, &rests.lengths(), slower)?;
-        if !certain && p >= RULES.moving_zero_p {
+        let is_chance = !certain && p >= RULES.moving_zero_p;
+        if is_chance || !rests.agree_with_responses() {
             return None;
         }
         let named = |of: usize| (rests.rests[of].0.name.clone(), levels[of]);
@@ -524,6 +547,27 @@ mod tests {
         assert!(moves(0.006));
         // As much slow noise as the difference of the offsets.
         assert!(!moves(0.02));
+    }
+
+    /// Levels of short rests that differ by chance: the whole records show one level.
+    #[test]
+    fn levels_of_rests_that_whole_records_contradict_are_no_zeros() {
+        let short = Beginning {
+            rest: 40,
+            ..AT_REST
+        };
+        let moves = |zero: f64| {
+            let records = [("a", 0.006), ("b", 0.0), ("c", -0.005)].map(|(name, rest)| {
+                let mut record = resting(name, zero * rest);
+                record.y[..40]
+                    .iter_mut()
+                    .for_each(|y| *y += (1.0 - zero) * rest);
+                record
+            });
+            MovingZero::of(&records, &[short; 3], 0.0, || 0.006).is_some()
+        };
+        assert!(moves(1.0));
+        assert!(!moves(0.0));
     }
 
     #[test]

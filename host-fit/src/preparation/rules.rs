@@ -16,6 +16,9 @@ rules! {
     /// If the reference explains less than this share, y counts as independent of u.
     related: f64 = 0.2, "share of the variance", "judgement";
 
+    /// y responds to the command of its own row if that response is at least this share of the gain.
+    own_row: f64 = 0.25, "share of the gain", "judgement: that of time constants up to 3.5 samples, for which one row matters";
+
     /// A record rests until its first edge plus this share of the dead time. An earlier response belongs to an edge
     /// before the record.
     surely_before: f64 = 0.6, "dead times", "state-dependent delays differ by less on the bundled flows";

@@ -5,7 +5,7 @@ use super::{Answer, Tone};
 use crate::data::Plant;
 use crate::diagnose::{Diagnosis, FLOW_LAG, FLOW_MEMORY, HeldOutBy, RULES, Rung, Verdict};
 use crate::discover::Glance;
-use crate::picture::significant;
+use crate::picture::{significant, time};
 use crate::residual::NoiseSource;
 use crate::terms::second_lag_s;
 use model_core::effect::Place;
@@ -367,9 +367,9 @@ fn dynamics(answer: &mut Answer, diagnosis: &Diagnosis) {
     let named = diagnosis.sets.iter().flatten().any(|name| name == FLOW_LAG);
     if let Some(second) = second_lag_s(&diagnosis.model).filter(|_| !named) {
         answer.note(format!(
-            "The model has a second lag of {} ms in series with the first; these records do not distinguish a lag of the \
+            "The model has a second lag of {} in series with the first; these records do not distinguish a lag of the \
              plant, of the sensor and of the actuator.",
-            significant(1e3 * second, 2)
+            time(second, 2)
         ));
     }
     for memory in &diagnosis.memory {

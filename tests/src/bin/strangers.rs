@@ -18,7 +18,7 @@ struct Arguments {
     /// A folder of sets; repeatable.
     #[arg(long, value_name = "DIR")]
     folder: Vec<PathBuf>,
-    /// Draw this many sets from the seed, sixteen kinds in turn, and run them.
+    /// Draw this many sets from the seed, 21 kinds in turn, and run them.
     #[arg(long, value_name = "COUNT", conflicts_with = "folder")]
     drawn: Option<usize>,
     /// Seed of the drawn sets.

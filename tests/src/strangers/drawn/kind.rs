@@ -1,6 +1,6 @@
 //! The kinds of records from other loggers.
 
-use super::plant::Plant;
+use super::plant::{Last, Plant};
 use super::{chance, logarithmic, normal};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -29,6 +29,8 @@ pub(super) struct Drawn {
     pub(super) dead_time: Option<f64>,
     /// The channel that drives y as well.
     pub(super) input: Option<&'static str>,
+    /// Whether a disturbance is in y that no effect describes, so that "unexplained" is right too.
+    pub(super) disturbed: bool,
     /// Further options of `import`.
     pub(super) import: Vec<String>,
     /// The rig in words.
@@ -124,6 +126,31 @@ pub(super) const KINDS: &[Kind] = &[
         what: "a channel that has nothing to do with y",
         draw: unrelated_channel,
     },
+    Kind {
+        name: "spikes",
+        what: "single wrong readings",
+        draw: spikes,
+    },
+    Kind {
+        name: "drift",
+        what: "a drifting environment",
+        draw: drift,
+    },
+    Kind {
+        name: "ringing",
+        what: "a response that rings",
+        draw: ringing,
+    },
+    Kind {
+        name: "integrating",
+        what: "a tank that integrates",
+        draw: integrating,
+    },
+    Kind {
+        name: "own-row",
+        what: "a reading of the same moment as the command",
+        draw: own_row,
+    },
 ];
 
 /// A rig before its records are drawn.
@@ -148,6 +175,7 @@ impl Rig {
             period_s: periods[rng.random_range(0..periods.len())],
             plant: Plant {
                 lags: vec![rng.random_range(15.0..90.0)],
+                last: Last::Nothing,
                 dead_time: f64::from(rng.random_range(0..350)) / 10.0,
                 gain,
                 level,
@@ -220,6 +248,7 @@ impl Rig {
             records,
             dead_time: Some(plant.dead_time),
             input: None,
+            disturbed: false,
             import: Vec::new(),
             truth,
         }
@@ -365,6 +394,7 @@ fn measured_input(rng: &mut ChaCha8Rng) -> Drawn {
     let mut record = rig.record(u, rng);
     let second = Plant {
         lags: vec![rig.plant.lags[0] * rng.random_range(0.7..1.5)],
+        last: Last::Nothing,
         dead_time: f64::from(rng.random_range(0..350)) / 10.0,
         gain: 0.25 * rig.plant.gain,
         level: 0.0,
@@ -405,5 +435,76 @@ fn unrelated_channel(rng: &mut ChaCha8Rng) -> Drawn {
             .collect(),
     };
     record.channel = Some(("room", values));
+    rig.of(vec![record])
+}
+
+/// One reading in about 300 is wrong by 0.3 to 1.5 times the gain.
+fn spikes(rng: &mut ChaCha8Rng) -> Drawn {
+    let rig = Rig::draw_any_order(rng);
+    let u = rig.switched(rng, 0.0, 3.0);
+    let mut record = rig.record(u, rng);
+    for y in &mut record.y {
+        if chance(rng, 1.0 / 300.0) {
+            let sign = if chance(rng, 0.5) { 1.0 } else { -1.0 };
+            *y += sign * rig.plant.gain * rng.random_range(0.3..1.5);
+        }
+    }
+    rig.of(vec![record])
+}
+
+/// A random walk behind a lag of 200 samples, 2 to 8 % of the gain.
+fn drift(rng: &mut ChaCha8Rng) -> Drawn {
+    let mut rig = Rig::draw_any_order(rng);
+    rig.samples *= 2;
+    let u = rig.switched(rng, 0.0, 3.0);
+    let mut record = rig.record(u, rng);
+    let (mut walk, mut room) = (0.0, 0.0);
+    let air: Vec<f64> = (0..rig.samples)
+        .map(|_| {
+            walk += normal(rng);
+            room += (walk - room) / 200.0;
+            room
+        })
+        .collect();
+    let mean = air.iter().sum::<f64>() / air.len() as f64;
+    let square = air.iter().map(|a| (a - mean).powi(2)).sum::<f64>() / air.len() as f64;
+    let size = rig.plant.gain * rng.random_range(0.02..0.08) / square.sqrt();
+    for (y, air) in record.y.iter_mut().zip(air) {
+        *y += size * air;
+    }
+    let mut drawn = rig.of(vec![record]);
+    drawn.disturbed = true;
+    drawn
+}
+
+fn ringing(rng: &mut ChaCha8Rng) -> Drawn {
+    let mut rig = Rig::draw(rng);
+    let (period, damping) = (rig.plant.lags[0], rng.random_range(0.1..0.5));
+    rig.plant.last = Last::Resonance { period, damping };
+    let u = rig.switched(rng, 0.0, 3.0);
+    rig.plant.lags.clear();
+    let mut drawn = rig.of(vec![rig.record(u, rng)]);
+    drawn.truth += &format!("; resonance of {period:.1} samples, damping {damping:.2}");
+    drawn
+}
+
+/// The lag is that of the valve.
+fn integrating(rng: &mut ChaCha8Rng) -> Drawn {
+    let mut rig = Rig::draw(rng);
+    let u = rig.switched(rng, 0.0, 2.0);
+    rig.plant.lags[0] = rng.random_range(5.0..30.0);
+    rig.plant.last = Last::Integrator;
+    rig.of(vec![rig.record(u, rng)])
+}
+
+/// The logger sets the command, waits, and reads: y of a row responds to u of that row.
+fn own_row(rng: &mut ChaCha8Rng) -> Drawn {
+    let mut rig = Rig::draw(rng);
+    let u = rig.switched(rng, 0.0, 2.0);
+    rig.plant.lags[0] = logarithmic(rng, 0.1, 2.0);
+    rig.plant.dead_time = 0.0;
+    let mut record = rig.record(u, rng);
+    record.u.rotate_right(1);
+    record.u[0] = 0.0;
     rig.of(vec![record])
 }

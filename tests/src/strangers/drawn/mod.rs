@@ -64,6 +64,9 @@ fn write(set: &Path, what: &str, drawn: &Drawn, logger: &Logger) -> Result<()> {
             text,
             "verdicts = [\"effect-missing\"]\nnames = [\"input-{name}\"]"
         )?,
+        None if drawn.disturbed => {
+            writeln!(text, "verdicts = [\"nothing-missing\", \"unexplained\"]")?;
+        }
         None => writeln!(text, "verdicts = [\"nothing-missing\"]")?,
     }
     if let Some(dead_time) = drawn.dead_time {

@@ -1,4 +1,5 @@
-//! Linear plants in continuous time: lags in series behind a dead time, with ten steps per sample.
+//! Linear plants in continuous time: lags in series behind a dead time, perhaps with a resonance or an integrator, with
+//! ten steps per sample.
 
 use super::normal;
 use rand_chacha::ChaCha8Rng;
@@ -6,10 +7,24 @@ use rand_chacha::ChaCha8Rng;
 /// Steps per sample.
 const STEPS: usize = 10;
 
+/// What follows the lags in series.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Last {
+    Nothing,
+    /// ẍ = ω²·(d − x) − 2·ζ·ω·ẋ, ω = 2π/period.
+    Resonance {
+        period: f64,
+        damping: f64,
+    },
+    /// ẋ = (d − ½)/100: a tank with a constant outflow.
+    Integrator,
+}
+
 /// A dead time and lags in series; times in samples.
 #[derive(Clone, Debug)]
 pub(super) struct Plant {
     pub(super) lags: Vec<f64>,
+    pub(super) last: Last,
     pub(super) dead_time: f64,
     pub(super) gain: f64,
     /// y at rest without command.
@@ -22,6 +37,8 @@ pub(super) struct Plant {
 struct Running<'a> {
     plant: &'a Plant,
     states: Vec<f64>,
+    /// x and ẋ of what follows the lags.
+    last: [f64; 2],
     /// Commands of the steps within the dead time, oldest first.
     under_way: std::collections::VecDeque<f64>,
 }
@@ -32,13 +49,16 @@ impl<'a> Running<'a> {
         Self {
             plant,
             states: vec![plant.before; plant.lags.len()],
+            last: match plant.last {
+                Last::Integrator => [0.0; 2],
+                Last::Nothing | Last::Resonance { .. } => [plant.before, 0.0],
+            },
             under_way: std::iter::repeat_n(plant.before, steps).collect(),
         }
     }
 
     fn y(&self) -> f64 {
-        let last = self.states.last().copied().unwrap_or_default();
-        self.plant.level + self.plant.gain * last
+        self.plant.level + self.plant.gain * self.last[0]
     }
 
     /// A sample with this command.
@@ -49,6 +69,17 @@ impl<'a> Running<'a> {
             for (state, lag) in self.states.iter_mut().zip(&self.plant.lags) {
                 *state += (drive - *state) * -(-1.0 / (STEPS as f64 * lag)).exp_m1();
                 drive = *state;
+            }
+            let step = 1.0 / STEPS as f64;
+            let [x, rate] = &mut self.last;
+            match self.plant.last {
+                Last::Nothing => *x = drive,
+                Last::Resonance { period, damping } => {
+                    let omega = std::f64::consts::TAU / period;
+                    *rate += step * omega * (omega * (drive - *x) - 2.0 * damping * *rate);
+                    *x += step * *rate;
+                }
+                Last::Integrator => *x += step * (drive - 0.5) / 100.0,
             }
         }
     }
@@ -98,6 +129,7 @@ mod tests {
     fn plant() -> Plant {
         Plant {
             lags: vec![20.0],
+            last: Last::Nothing,
             dead_time: 7.5,
             gain: -3.0,
             level: 10.0,
@@ -114,6 +146,36 @@ mod tests {
             let known = 10.0 - 3.0 * -(-since / 20.0).exp_m1();
             assert!((y - known).abs() < 1e-9, "{sample}: {y}, {known}");
         }
+    }
+
+    /// The overshoot is exp(−π·ζ/√(1 − ζ²)); an integrator moves by (1 − ½)/100 a sample.
+    #[test]
+    fn a_resonance_overshoots_and_an_integrator_does_not_end() {
+        let last = Last::Resonance {
+            period: 60.0,
+            damping: 0.3,
+        };
+        let rings = Plant {
+            last,
+            lags: Vec::new(),
+            ..plant()
+        };
+        let most = rings
+            .answer(&[1.0; 400])
+            .into_iter()
+            .fold(f64::INFINITY, f64::min);
+        assert!((most - (10.0 - 3.0 * 1.372)).abs() < 0.05, "{most}");
+        let tank = Plant {
+            last: Last::Integrator,
+            ..plant()
+        };
+        let y = tank.answer(&[1.0; 400]);
+        assert!(
+            (y[399] - y[299] + 1.5).abs() < 1e-6,
+            "{} {}",
+            y[299],
+            y[399]
+        );
     }
 
     #[test]

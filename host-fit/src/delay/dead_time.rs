@@ -126,6 +126,12 @@ fn prior(ratio: f64) -> f64 {
     }
 }
 
+/// The least b that is tried: `usual`, or less where S is so long, as of an integrator, that it would be a second lag of
+/// more than a fifth of a sample.
+fn least_ratio(usual: f64, plant: &Plant) -> f64 {
+    usual.min(0.2 / plant.mean_sum().max(1.0))
+}
+
 /// Third lags that are tried, as shares of the sum of the first two time constants; the smallest of three is at most half
 /// of it.
 const THIRDS: [f64; 5] = [0.06, 0.12, 0.2, 0.3, 0.45];
@@ -200,7 +206,11 @@ pub(crate) fn dead_time(
     let second = fits.get(1);
     let (centre, step) = match second {
         Some(second) => {
-            let ratio = second.at.plant.ratio.max(0.005);
+            let ratio = second
+                .at
+                .plant
+                .ratio
+                .max(least_ratio(0.005, &second.at.plant));
             let covariance = second.covariance(noise).unwrap_or_default();
             let stride = covariance.len().isqrt();
             let variance = covariance.get(2 * stride + 2);
@@ -216,7 +226,7 @@ pub(crate) fn dead_time(
         let mut at = start;
         for i in usize::from(direction < 0.0)..=RULES.ratios {
             let ratio = centre * (direction * step * i as f64).exp();
-            if !(0.002..=LARGEST_RATIO).contains(&ratio) {
+            if !(least_ratio(0.002, &start)..=LARGEST_RATIO).contains(&ratio) {
                 break;
             }
             let from = Plant { ratio, ..at };

@@ -406,7 +406,9 @@ fn all_within(delay: f64, longest: f64, y: impl Fn(&[f64], &[f64]) -> Vec<f64>) 
         let holds = found.low <= delay && delay <= found.high;
         assert!(
             holds && found.high - found.low < longest,
-            "seed {seed}, {delay}: {found:?}"
+            "seed {seed}, {delay}: {found:?} {:?} {:?}",
+            study.method,
+            study.plant
         );
     }
 }

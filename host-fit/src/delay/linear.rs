@@ -263,14 +263,21 @@ pub(crate) fn evaluate(series: &[Series], plant: Plant) -> Option<Evaluation> {
 }
 
 /// Initial linear plants of first and second order from a grid over decimated records: the deepest minima
-/// along the time constants. There may be several, because a free initial state can imitate a response.
-pub(crate) fn coarse(series: &[Series], max_delay: f64, spacing: usize) -> Vec<Plant> {
+/// along the time constants. There may be several, because a free initial state can imitate a response. Records are
+/// prewhitened for a disturbance with this `correlation` of neighbouring samples.
+pub(crate) fn coarse(
+    series: &[Series],
+    max_delay: f64,
+    spacing: usize,
+    correlation: f64,
+) -> Vec<Plant> {
     let samples: usize = series.iter().map(|s| s.y.len()).sum();
     let factor = samples
         .div_ceil(COARSE_SAMPLES)
         .min((spacing / 8).max(1))
         .max(1);
-    let thinned: Vec<Series> = series.iter().map(|s| s.thinned(factor)).collect();
+    let thinned = series.iter().map(|s| s.thinned(factor));
+    let thinned: Vec<Series> = thinned.map(|s| s.whitened(correlation)).collect();
     let longest = thinned.iter().map(|s| s.y.len()).max().unwrap_or(0) as f64;
     let last = (max_delay / factor as f64).floor().max(1.0);
     let mut starts = Vec::new();
@@ -423,7 +430,8 @@ pub(crate) fn refine(
                 delta_h
             },
             1e-4,
-            1e-4,
+            // Of an integrator, with a very long S, b is very small.
+            (1e-2 * plant.ratio).clamp(1e-7, 1e-4),
             delta_h,
             1e-4,
         ];
@@ -493,7 +501,11 @@ pub(crate) fn fit(series: &[Series], starts: &[Plant], max_delay: f64) -> Vec<Re
     let Some(first) = least(&mut tried) else {
         return Vec::new();
     };
-    let around = STARTS.into_iter().map(|ratio| {
+    // The dead time of a first order contains small lags; in units of a very long S, as of an integrator, they are far
+    // below the other starts.
+    let within = 0.5 * first.at.plant.mean_delay() / first.at.plant.mean_sum();
+    let within = Some(within).filter(|ratio| *ratio > 0.0 && *ratio < STARTS[0]);
+    let around = within.into_iter().chain(STARTS).map(|ratio| {
         let plant = first.at.plant;
         // The second time constant is about b·S; the dead time is shortened by it.
         let second = ratio * plant.mean_sum();

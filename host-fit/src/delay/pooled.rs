@@ -78,7 +78,7 @@ impl Pooled {
             .map(|r| Series::new(r, middle))
             .filter(|s| !s.switching.changes.is_empty())
             .collect();
-        let starts = coarse(&all, max_delay, spacing);
+        let starts = coarse(&all, max_delay, spacing, 0.0);
         let samples: usize = all.iter().map(|s| s.y.len()).sum();
         let shortest = starts
             .iter()
@@ -123,11 +123,17 @@ impl Pooled {
             })
         };
         let found = fitted(&picked, &starts, 0.0)?;
-        // A slow disturbance, such as the temperature of a room, hides the responses unless they are prewhitened.
-        if !found.describes && found.correlation > 0.0 {
+        // A slow disturbance, such as the temperature of a room, hides or biases the responses unless they are
+        // prewhitened.
+        if found.correlation > 0.0
+            && (!found.describes || found.correlation > RULES.most_correlation)
+        {
             let whitened = picked.iter().map(|s| s.whitened(found.correlation));
             let whitened: Vec<Series> = whitened.collect();
             let own = correlation_of_neighbours(&evaluate(&all, found.plant)?);
+            let slower = |plant: &Plant| plant.slower(1.0 / scale);
+            let anew = coarse(&all, max_delay, spacing, found.correlation);
+            let starts: Vec<Plant> = anew.iter().map(slower).chain(starts).collect();
             let better = fitted(&whitened, &starts, own)
                 .filter(|better| better.describes)
                 .and_then(|better| pooled(better, own))

@@ -24,6 +24,14 @@ pub(crate) fn white_noise<'a>(records: impl Iterator<Item = &'a [f64]>) -> f64 {
 pub(crate) fn without_outliers(y: &[f64]) -> Vec<f64> {
     let least = OUTLIER * white_noise(std::iter::once(y)).sqrt();
     let mut out = y.to_vec();
+    // The first and the last sample have one neighbour.
+    if let [first, second, .., before, last] = out.as_mut_slice() {
+        for (end, neighbour) in [(first, *second), (last, *before)] {
+            if least > 0.0 && (*end - neighbour).abs() > least {
+                *end = neighbour;
+            }
+        }
+    }
     for k in 1..y.len().saturating_sub(1) {
         let (before, here, after) = (y[k - 1], y[k], y[k + 1]);
         let middle = f64::midpoint(before, after);
@@ -53,6 +61,7 @@ mod tests {
         assert_eq!(without_outliers(&step), step);
         y[50] += 0.5;
         y[300] -= 2.0;
+        y[399] += 1.0;
         for (k, (cleaned, clean)) in without_outliers(&y).iter().zip(&step).enumerate() {
             assert!((cleaned - clean).abs() < 0.03, "{k}: {cleaned} {clean}");
         }

@@ -21,6 +21,9 @@ const COARSE_STEP: f64 = 1.5;
 const COARSE_RATIOS: [f64; 2] = [0.0, 0.2];
 /// Number of grid minima, over the time constants, that are refined.
 const COARSE_STARTS: usize = 3;
+/// Time constant of a response within one sample, samples, and delays before it that the grid search tries.
+const IMMEDIATE: f64 = 0.2;
+const IMMEDIATE_DELAYS: usize = 300;
 /// Largest ratio: damping ratio 0.05.
 pub(crate) const LARGEST_RATIO: f64 = 100.0;
 /// Ratios from which a second order starts.
@@ -282,6 +285,7 @@ pub(crate) fn coarse(
     let last = (max_delay / factor as f64).floor().max(1.0);
     let mut starts = Vec::new();
     let mut responses = Vec::new();
+    let mut least = f64::INFINITY;
     for ratio in COARSE_RATIOS {
         // The best plant for each time constant.
         let mut floor: Vec<(f64, Plant)> = Vec::new();
@@ -318,9 +322,23 @@ pub(crate) fn coarse(
             .map(|(_, f)| f)
             .collect();
         order::ascending(&mut valleys, |one| one.0);
+        least = valleys.first().map_or(least, |(rss, _)| least.min(*rss));
         let best = valleys.into_iter().take(COARSE_STARTS);
         starts.extend(best.map(|(_, plant)| plant.slower(factor as f64)));
     }
+    // A response within one sample lies below the shortest time constant of a long range of delays.
+    let parts = eliminate(&thinned, &Plant::linear(0.0, IMMEDIATE, 0.0));
+    let mut immediate = None;
+    for delay in 0..=(last as usize).min(IMMEDIATE_DELAYS) {
+        let plant = Plant::linear(delay as f64, IMMEDIATE, 0.0);
+        if let Some((_, rss)) = gain_and_rss(&thinned, &parts, &plant, &mut responses)
+            && rss < least
+        {
+            least = rss;
+            immediate = Some(plant.slower(factor as f64));
+        }
+    }
+    starts.extend(immediate);
     starts
 }
 

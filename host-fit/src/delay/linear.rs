@@ -280,7 +280,9 @@ pub(crate) fn coarse(
         .min((spacing / 8).max(1))
         .max(1);
     let thinned = series.iter().map(|s| s.thinned(factor));
-    let thinned: Vec<Series> = thinned.map(|s| s.whitened(correlation)).collect();
+    let thinned: Vec<Series> = thinned
+        .map(|s| s.whitened(correlation.powf(factor as f64)))
+        .collect();
     let longest = thinned.iter().map(|s| s.y.len()).max().unwrap_or(0) as f64;
     let last = (max_delay / factor as f64).floor().max(1.0);
     let mut starts = Vec::new();

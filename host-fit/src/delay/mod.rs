@@ -8,6 +8,7 @@
 mod begun;
 mod dead_time;
 mod dependence;
+mod disturbance;
 mod drawing;
 mod edge;
 #[cfg(test)]

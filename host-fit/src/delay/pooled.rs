@@ -2,10 +2,8 @@
 
 use super::dead_time::{DeadTime, correlation_of_neighbours, dead_time, widened_variance};
 use super::linear::{Free, Refined, Series, coarse, evaluate, fit, refine};
-use super::local::by_trajectory;
 use super::plant::Plant;
 use super::rules::RULES;
-use super::spread::spread;
 use super::white::white_noise;
 use crate::data::Record;
 use crate::linalg::dot;
@@ -32,6 +30,8 @@ pub(crate) struct Pooled {
     pub(crate) responds: bool,
     /// The longest delay that is searched, samples.
     pub(crate) max_delay: f64,
+    /// Correlation of neighbouring residuals.
+    pub(crate) correlation: f64,
     /// Correlation of neighbouring samples of the disturbance for which records are prewhitened.
     pub(crate) whitening: f64,
 }
@@ -67,8 +67,13 @@ pub(crate) fn spacing(records: &[&Record]) -> usize {
 }
 
 impl Pooled {
-    /// Fits one plant to `records`. `None` where the command never changes.
-    pub(crate) fn of(records: &[&Record], max_delay: Option<usize>) -> Option<Self> {
+    /// Fits one plant to `records`, which are prewhitened for a disturbance with this `correlation` of neighbouring
+    /// samples. `None` where the command never changes.
+    pub(crate) fn of(
+        records: &[&Record],
+        max_delay: Option<usize>,
+        correlation: f64,
+    ) -> Option<Self> {
         let range = command_range(records);
         let middle = f64::midpoint(range.0, range.1);
         let spacing = spacing(records);
@@ -78,7 +83,7 @@ impl Pooled {
             .map(|r| Series::new(r, middle))
             .filter(|s| !s.switching.changes.is_empty())
             .collect();
-        let starts = coarse(&all, max_delay, spacing, 0.0);
+        let starts = coarse(&all, max_delay, spacing, correlation);
         let samples: usize = all.iter().map(|s| s.y.len()).sum();
         let shortest = starts
             .iter()
@@ -89,71 +94,35 @@ impl Pooled {
             .min(((shortest / 10.0) as usize).max(1))
             .min((spacing / 8).max(1));
         let scale = factor as f64;
-        let picked: Vec<Series> = all.iter().map(|s| s.picked(factor)).collect();
+        let picked = all.iter().map(|s| s.picked(factor));
+        let picked: Vec<Series> = picked
+            .map(|s| s.whitened(correlation.powf(scale)))
+            .collect();
         let starts: Vec<Plant> = starts.iter().map(|p| p.slower(1.0 / scale)).collect();
-        let white = white_noise(records.iter().map(|record| record.y.as_slice()));
-        let fitted = |picked: &[Series], starts: &[Plant], correlation: f64| {
-            let fits = fit(picked, starts, max_delay / scale);
-            let (fits, free) = with_directions(picked, fits, max_delay / scale);
-            let clock = RULES.clock / scale;
-            let (estimate, chosen) = dead_time(picked, &fits, free, max_delay / scale, clock)?;
-            let fit = &fits.get(chosen)?.at;
-            let plant = fit.plant.slower(scale);
-            Some(Fitted {
-                estimate: estimate.scaled(scale),
-                describes: describes(&all, plant, white, correlation)?,
-                correlation: correlation_of_neighbours(fit),
-                plant,
-            })
-        };
-        let pooled = |fitted: Fitted, correlation: f64| {
-            let whitened: Vec<Series> = all.iter().map(|s| s.whitened(correlation)).collect();
-            let at = evaluate(&whitened, fitted.plant)?;
-            let noise = widened_variance(&at);
-            Some(Self {
-                range,
-                plant: at.plant,
-                gain: at.gain,
-                dead_time: fitted.estimate,
-                noise,
-                responds: at.explained > RULES.detection * noise,
-                max_delay,
-                describes: fitted.describes,
-                whitening: correlation,
-            })
-        };
-        let found = fitted(&picked, &starts, 0.0)?;
-        // A slow disturbance, such as the temperature of a room, hides or biases the responses unless they are
-        // prewhitened.
-        if found.correlation > 0.0
-            && (!found.describes || found.correlation > RULES.most_correlation)
-        {
-            let whitened = picked.iter().map(|s| s.whitened(found.correlation));
-            let whitened: Vec<Series> = whitened.collect();
-            let own = correlation_of_neighbours(&evaluate(&all, found.plant)?);
-            let slower = |plant: &Plant| plant.slower(1.0 / scale);
-            let anew = coarse(&all, max_delay, spacing, found.correlation);
-            let starts: Vec<Plant> = anew.iter().map(slower).chain(starts).collect();
-            let better = fitted(&whitened, &starts, own)
-                .filter(|better| better.describes)
-                .and_then(|better| pooled(better, own))
-                .filter(|better| better.has_one_dead_time(&all));
-            if better.is_some() {
-                return better;
-            }
-        }
-        pooled(found, 0.0)
-    }
-
-    /// Whether the dead times of single edges scatter by no more than their errors explain, and most are measured.
-    fn has_one_dead_time(&self, all: &[Series]) -> bool {
-        let series = all.iter().map(|s| s.whitened(self.whitening));
-        let edges: Vec<_> = series.flat_map(|s| by_trajectory(&s, self)).collect();
-        let known: Vec<_> = edges.iter().flatten().collect();
-        let delays: Vec<f64> = known.iter().map(|edge| edge.delay).collect();
-        let square: f64 = known.iter().map(|edge| edge.standard_error.powi(2)).sum();
-        let expected = (square / known.len().max(1) as f64).sqrt();
-        2 * known.len() > edges.len() && spread(&delays).sd <= RULES.scatter_allowed * expected
+        let fits = fit(&picked, &starts, max_delay / scale);
+        let (fits, free) = with_directions(&picked, fits, max_delay / scale);
+        let (estimate, chosen) =
+            dead_time(&picked, &fits, free, max_delay / scale, RULES.clock / scale)?;
+        let whole: Vec<Series> = all.iter().map(|s| s.whitened(correlation)).collect();
+        let at = evaluate(&whole, fits.get(chosen)?.at.plant.slower(scale))?;
+        let noise = widened_variance(&at);
+        let spread: f64 = whole.iter().map(|s| dot(&s.y, &s.y)).sum();
+        let white = white_noise(records.iter().map(|record| record.y.as_slice()))
+            * (1.0 + correlation * correlation)
+            * samples as f64;
+        Some(Self {
+            range,
+            plant: at.plant,
+            gain: at.gain,
+            dead_time: estimate.scaled(scale),
+            noise,
+            responds: at.explained > RULES.detection * noise,
+            max_delay,
+            describes: at.rss
+                <= RULES.noise_allowed.powi(2) * white + RULES.plant_fits.powi(2) * spread,
+            correlation: correlation_of_neighbours(&at),
+            whitening: correlation,
+        })
     }
 
     /// Middle of the range of u: above it the command is on.
@@ -165,26 +134,6 @@ impl Pooled {
     pub(crate) fn series(&self, record: &Record) -> Series {
         Series::new(record, self.middle()).whitened(self.whitening)
     }
-}
-
-/// One plant fitted to the records.
-struct Fitted {
-    estimate: DeadTime,
-    describes: bool,
-    /// Correlation of neighbouring residuals of the fit.
-    correlation: f64,
-    plant: Plant,
-}
-
-/// Whether the residual of a plant is close to the noise, after prewhitening for a disturbance with this `correlation`
-/// of neighbouring samples. `None` if the command has no influence.
-fn describes(all: &[Series], plant: Plant, white: f64, correlation: f64) -> Option<bool> {
-    let whitened: Vec<Series> = all.iter().map(|s| s.whitened(correlation)).collect();
-    let at = evaluate(&whitened, plant)?;
-    let samples: usize = whitened.iter().map(|s| s.y.len()).sum();
-    let square: f64 = whitened.iter().map(|s| dot(&s.y, &s.y)).sum();
-    let noise = white * (1.0 + correlation * correlation) * samples as f64;
-    Some(at.rss <= RULES.noise_allowed.powi(2) * noise + RULES.plant_fits.powi(2) * square)
 }
 
 /// The longest delay that the records can show, samples: from the first change of the command to their end.

@@ -42,7 +42,7 @@ rules! {
     /// The first search for the start of a response uses only this many of the shapes before and after it.
     coarse_shapes: usize = 9, "", "every other response";
     /// Largest autocorrelation of neighbouring residuals by which a variance is corrected; a higher one means that
-    /// the motion before the response is not modelled.
+    /// the motion before the response is not modelled, and that whole records are prewhitened.
     most_correlation: f64 = 0.82, "", "multiplies a variance by at most 10; tested in `onset.rs`";
 
     /// The earliest peak of the likelihood of at least this height, relative to the highest, is the start of the

@@ -3,6 +3,7 @@
 use super::begun::Begun;
 use super::dead_time::DeadTime;
 use super::dependence::{Tests, words};
+use super::disturbance;
 use super::edge::{Edge, edges};
 use super::law::{DelayLawFit, DelayPoint, fit_delay_law};
 use super::linear::Series;
@@ -194,7 +195,7 @@ impl Measurement {
         let fitted: Vec<&Record> = learned.iter().map(|begun| begun.sure()).collect();
         let fitted = &fitted;
         let spacing = spacing(fitted);
-        let Some(pooled) = Pooled::of(fitted, options.max_delay) else {
+        let Some(pooled) = disturbance::pooled(fitted, options.max_delay) else {
             return Self::without_response(&records, options, spacing);
         };
         let response = pooled.plant.mean_sum();

@@ -237,9 +237,9 @@ pub struct MovingZero {
 
 impl MovingZero {
     /// Whether records rest at different levels under a command of `off`. The difference must be significant, larger
-    /// than slow noise explains, and agree with the responses through whole records. Half of that suffices if the levels drift from record to record with a
-    /// significant order. `left` gives the rms residual of the reference responses within records; it is used if
-    /// y_sd is not stated.
+    /// than slow noise explains, and agree with the responses through whole records. Half of that suffices if the
+    /// levels drift from record to record with a significant order. `left` gives the rms residual of the reference
+    /// responses within records; it is used if y_sd is not stated.
     pub(super) fn of(
         records: &[Record],
         beginnings: &[Beginning],

@@ -2,7 +2,7 @@
 //!
 //! In a model, and on a board, y_k is read before u_k is set, so u_k acts on y_{k+1} first. A logger that sets the
 //! command, waits and then reads writes rows in which y_k responds to u_k. For a plant as fast as the sampling no dead
-//! time describes that; the command is then read one row later.
+//! time describes that; u is then moved up by one row.
 
 use super::RULES;
 use crate::data::{Record, Use};
@@ -62,6 +62,7 @@ fn moved_up(record: &Record) -> Record {
 
 #[cfg(test)]
 mod tests {
+    use super::super::Preparation;
     use super::*;
 
     /// First order with this time constant and dead time, samples; the command of row k acts from row k + 1 on.
@@ -93,7 +94,20 @@ mod tests {
             same_row.u[0] = 0.0;
             let moved = in_own_row(&[same_row]).expect("it acts in its own row");
             assert_eq!(moved[0].u[..599], from_next.u[..599]);
+            // Only once.
+            assert_eq!(in_own_row(&moved), None);
         }
+    }
+
+    #[test]
+    fn every_command_works_on_the_moved_rows() {
+        let mut same_row = record(0.1, 0, false);
+        same_row.u.rotate_right(1);
+        same_row.u[0] = 0.0;
+        let prepared = Preparation::of(std::slice::from_ref(&same_row));
+        assert!(prepared.own_row && prepared.records[0].u[..599] == same_row.u[1..]);
+        assert!(prepared.remarks().iter().any(|r| r.contains("its own row")));
+        assert!(!Preparation::of(&prepared.records).own_row);
     }
 
     #[test]

@@ -156,7 +156,7 @@ pub fn extend(
         Some(samples) => {
             cut = learning
                 .iter()
-                .flat_map(|record| pieces(record, samples))
+                .flat_map(|record| pieces(record, 0, samples))
                 .collect();
             cut.iter().collect()
         }

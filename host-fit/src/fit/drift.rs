@@ -26,20 +26,20 @@ fn remembers(model: &Model, samples: usize) -> bool {
         .is_ok_and(|pole| left(pole) > RULES.drifts)
 }
 
-/// A record cut into pieces of this many scored samples. Each piece is preceded by samples in which the run follows
-/// the measurement; the remainder belongs to the last piece.
-pub(crate) fn pieces(record: &Record, samples: usize) -> Vec<Record> {
-    let count = (record.len() / samples.max(1)).max(1);
+/// A record from sample `first` on, cut into pieces of this many scored samples. Each piece is preceded by samples in
+/// which the run follows the measurement; the remainder belongs to the last piece.
+pub(crate) fn pieces(record: &Record, first: usize, samples: usize) -> Vec<Record> {
+    let count = (record.len().saturating_sub(first) / samples.max(1)).max(1);
     let end = |piece: usize| {
         if piece + 1 == count {
             record.len()
         } else {
-            (piece + 1) * samples
+            first + (piece + 1) * samples
         }
     };
     let follow = samples / RULES.memories;
     let piece = |piece: usize| {
-        let from = piece * samples;
+        let from = first + piece * samples;
         let before = from.saturating_sub(follow);
         let mut part = record.part(before, end(piece));
         if from > 0 {

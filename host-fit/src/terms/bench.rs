@@ -3,8 +3,8 @@
 use super::RULES;
 use super::judge::Judge;
 use super::units::Units;
-use crate::data::Record;
-use crate::fit::{FitOptions, restart_after};
+use crate::data::{Record, Use};
+use crate::fit::{FitOptions, pieces, restart_after};
 use crate::model::Model;
 use crate::preparation::{FirstOrder, MovingZero, Preparation, RULES as PREPARATION};
 
@@ -55,7 +55,8 @@ impl Bench {
 
 /// Samples after which free runs of `model` over `records` (both in the same units) are restarted, for plants that
 /// drift. `None` if the first-order `reference` forgets its initial state well within the records: a model that
-/// lacks an input may have a pole at 1 although the plant has none.
+/// lacks an input may have a pole at 1 although the plant has none. `None`, too, if runs over whole estimation records
+/// do not drift: their error is then no larger than that of restarted runs, which begin with the noise of a sample.
 pub(crate) fn restarted(
     model: &Model,
     records: &[Record],
@@ -66,7 +67,41 @@ pub(crate) fn restarted(
         reference.explained > RULES.self_regulates
             && reference.time_constant * PREPARATION.times_of_rest < shortest
     });
-    restart_after(model, records).filter(|_| !forgets)
+    let drifts = |samples: &usize| {
+        let learning = || records.iter().filter(|record| record.role == Use::Identify);
+        let cut: Vec<Record> = learning()
+            .flat_map(|record| pieces(record, 0, *samples))
+            .collect();
+        // An integrator keeps the noise of its first sample: the mean of a whole run is no drift.
+        mean_square(model, learning(), true) > mean_square(model, cut.iter(), false)
+    };
+    restart_after(model, records).filter(|samples| !forgets && drifts(samples))
+}
+
+/// Mean square error of the free runs over the scored samples, around the mean of each run if `centred`; infinite if a
+/// run diverges or nothing is scored.
+fn mean_square<'r>(model: &Model, records: impl Iterator<Item = &'r Record>, centred: bool) -> f64 {
+    let (mut sum, mut samples) = (0.0, 0.0);
+    for record in records {
+        let Ok(run) = model.free_run(record) else {
+            return f64::INFINITY;
+        };
+        let scored = record.y.iter().zip(run).skip(record.lead);
+        let errors: Vec<f64> = scored.map(|(y, run)| y - run).collect();
+        let count = errors.len() as f64;
+        let mean = if centred && count > 0.0 {
+            errors.iter().sum::<f64>() / count
+        } else {
+            0.0
+        };
+        sum += errors.iter().map(|e| (e - mean).powi(2)).sum::<f64>();
+        samples += count;
+    }
+    if samples > 0.0 {
+        sum / samples
+    } else {
+        f64::INFINITY
+    }
 }
 
 #[cfg(test)]
@@ -100,5 +135,40 @@ mod tests {
         let reference = FirstOrder::fitted(&records).expect("y follows u");
         assert!(restarted(&integrating, &records, None).is_some());
         assert_eq!(restarted(&integrating, &records, Some(&reference)), None);
+    }
+
+    /// A tank with white noise is known over the whole record; one with a random walk is not.
+    #[test]
+    fn a_tank_is_restarted_only_if_it_drifts() {
+        let model = Model {
+            start: Start::Measured,
+            a: vec![1.0],
+            b: vec![0.1],
+            c: vec![0.0],
+            constant: -0.05,
+            ..Model::default()
+        };
+        let u: Vec<f64> = (0..4000)
+            .map(|k| f64::from((k / 70 + k / 310) % 2))
+            .collect();
+        let with = |walk: f64, noise: f64| {
+            // A fixed sequence with a standard deviation of about 1.
+            let drawn = |k: usize| ((k * 7919 + k * k * 104_729) % 1009) as f64 / 291.0 - 1.73;
+            let mut level = 3.0;
+            let y = u.iter().enumerate().map(|(k, u)| {
+                let now = level + noise * drawn(k);
+                level += 0.1 * u - 0.05 + walk * drawn(k + 4001);
+                now
+            });
+            vec![Record::new(
+                "tank",
+                Use::Identify,
+                1.0,
+                u.clone(),
+                y.collect(),
+            )]
+        };
+        assert_eq!(restarted(&model, &with(0.0, 0.1), None), None);
+        assert!(restarted(&model, &with(0.1, 0.1), None).is_some());
     }
 }

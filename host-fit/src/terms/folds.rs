@@ -37,15 +37,13 @@ impl Judging {
 impl Fold {
     /// The same split with free runs restarted every `samples` samples.
     pub(crate) fn restarted(&self, samples: usize) -> Self {
-        let judging = self.judging.iter().flat_map(|judging| {
-            let judged = judging.record.part(judging.from, judging.record.len());
-            pieces(&judged, samples)
-        });
+        let judging = (self.judging.iter())
+            .flat_map(|judging| pieces(&judging.record, judging.from, samples));
         Self {
             learning: self
                 .learning
                 .iter()
-                .flat_map(|record| pieces(record, samples))
+                .flat_map(|record| pieces(record, 0, samples))
                 .collect(),
             judging: judging.map(|record| Judging { record, from: 0 }).collect(),
         }
@@ -194,6 +192,20 @@ mod tests {
             .collect();
         assert_eq!(judged, [6.0, 7.0, 8.0, 9.0]);
         assert!((fold.learning[1].t0 - 0.003).abs() < 1e-12);
+    }
+
+    /// A run that began at the first validated sample would not know the commands on their way then.
+    #[test]
+    fn the_first_piece_follows_the_measurement_too() {
+        let mut only = record("a", Use::Identify);
+        only.u = vec![0.0; 100];
+        only.y = (0..100).map(f64::from).collect();
+        let (folds, _) = folds(&[only]);
+        let from = folds[0].judging[0].from;
+        let fold = folds[0].restarted(16);
+        let first = &fold.judging[0].record;
+        assert!(first.lead > 0 && first.followed.len() == first.lead);
+        assert_eq!(first.y[first.lead], from as f64);
     }
 
     #[test]

@@ -96,7 +96,7 @@ impl Judge {
             folds = folds.iter().map(|fold| fold.restarted(samples)).collect();
             identify = identify
                 .iter()
-                .flat_map(|record| pieces(record, samples))
+                .flat_map(|record| pieces(record, 0, samples))
                 .collect();
         }
         if folds.is_empty() {

@@ -87,6 +87,41 @@ const STEPS: &[Step] = &[
         room: None,
         run: || crate::browser::browser(&[]),
     },
+    // The emulated board, one after the other: the longest chain, so it starts first after the build.
+    Step {
+        name: "faults",
+        after: &[SET_UP, BUILD],
+        room: Some(Room::Firmware),
+        run: || crate::faults::faults(&[]),
+    },
+    // Links only without panics; runs the constants; checks the budgets.
+    Step {
+        name: "pil",
+        after: &[SET_UP, BUILD],
+        room: Some(Room::Firmware),
+        run: crate::budgets::check,
+    },
+    // The same at other periods, and the emulated board at one of them.
+    Step {
+        name: "periods",
+        after: &[SET_UP, BUILD],
+        room: Some(Room::Firmware),
+        run: || crate::periods::periods(&[]),
+    },
+    // The whole circle, unattended.
+    Step {
+        name: "rig-day",
+        after: &[SET_UP, BUILD],
+        room: Some(Room::Firmware),
+        run: || crate::rig_day::rig_day(&["--brief".to_owned()]),
+    },
+    // The whole workflow: the model found by the demo is built for the board and runs there.
+    Step {
+        name: "demo on board",
+        after: &[SET_UP, BUILD],
+        room: Some(Room::Firmware),
+        run: demo_on_board,
+    },
     Step {
         name: "lints",
         after: &[],
@@ -237,40 +272,6 @@ const STEPS: &[Step] = &[
         after: &[BUILD],
         room: None,
         run: || crate::identified::identified(&["--check".to_owned()]),
-    },
-    Step {
-        name: "faults",
-        after: &[SET_UP, BUILD],
-        room: Some(Room::Firmware),
-        run: || crate::faults::faults(&[]),
-    },
-    // Links only without panics; runs the constants; checks the budgets.
-    Step {
-        name: "pil",
-        after: &[SET_UP, BUILD],
-        room: Some(Room::Firmware),
-        run: crate::budgets::check,
-    },
-    // The same at other periods, and the emulated board at one of them.
-    Step {
-        name: "periods",
-        after: &[SET_UP, BUILD],
-        room: Some(Room::Firmware),
-        run: || crate::periods::periods(&[]),
-    },
-    // The whole circle, unattended.
-    Step {
-        name: "rig-day",
-        after: &[SET_UP, BUILD],
-        room: Some(Room::Firmware),
-        run: || crate::rig_day::rig_day(&["--brief".to_owned()]),
-    },
-    // The whole workflow: the model found by the demo is built for the board and runs there.
-    Step {
-        name: "demo on board",
-        after: &[SET_UP, BUILD],
-        room: Some(Room::Firmware),
-        run: demo_on_board,
     },
 ];
 

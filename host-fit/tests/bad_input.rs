@@ -272,6 +272,70 @@ fn imports_replace_nothing_unasked_and_are_named_where_they_are_needed() {
     assert_eq!(stderr.matches("os error 2").count(), 1, "{stderr}");
 }
 
+/// A log with missing values and lost rows is imported with `--fill-gaps`, which every refusal names.
+#[test]
+fn gaps_of_a_log_are_filled_on_request() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let write = |name: &str, no_y: &[usize], no_fan: &[usize], lost: &[usize]| {
+        let rows = (0..60).filter(|k| !lost.contains(k)).map(|k| {
+            let or = |rows: &[usize], mark: &str, value: String| match rows.contains(&k) {
+                true => mark.to_owned(),
+                false => value,
+            };
+            let (y, fan) = (or(no_y, "", k.to_string()), or(no_fan, "NaN", "7".into()));
+            format!("{k},{},{y},{fan}\n", k / 10 % 2)
+        });
+        fs::write(
+            at(name),
+            "t,u,y,fan\n".to_owned() + &rows.collect::<String>(),
+        )
+        .unwrap();
+        at(name)
+    };
+    for (log, place) in [
+        (write("cells.csv", &[10], &[], &[]), "line 12, column `y`"),
+        (write("marks.csv", &[], &[10], &[]), "line 12, column `fan`"),
+        (
+            write("rows.csv", &[], &[], &[10, 30, 31]),
+            "line 12, column `t`",
+        ),
+    ] {
+        let (code, _, stderr) = host_fit(&["import", &log, "--channel", "fan", "-o", &at("none")]);
+        assert_eq!(code, Some(1));
+        assert!(
+            stderr.contains(place) && stderr.contains("--fill-gaps SECONDS"),
+            "{stderr}"
+        );
+    }
+    let log = write("log.csv", &[10, 20, 21], &[5], &[40, 41]);
+    let set = at("set");
+    let (code, stdout, stderr) = host_fit(&["import", &log, "-o", &set, "--fill-gaps", "3"]);
+    assert_eq!(code, Some(0), "{stderr}");
+    for part in [
+        "`y`: 3 of 58 values are interpolated (lines 12, 22, 23)",
+        "`fan`: 1 of 58 values are interpolated (line 7)",
+        "2 missing row(s) are inserted (before line 42)",
+    ] {
+        assert!(stdout.contains(part), "no `{part}` in {stdout}");
+    }
+    let record = &DataSet::load(Path::new(&set)).unwrap().records[0];
+    let expected: Vec<f64> = (0..60).map(f64::from).collect();
+    assert!(
+        record
+            .y
+            .iter()
+            .zip(&expected)
+            .all(|(a, b)| (a - b).abs() < 1e-9)
+    );
+    assert_eq!((record.len(), record.u[40], record.u[41]), (60, 1.0, 1.0));
+    assert_eq!(record.channels["fan"], [7.0; 60]);
+    let manifest = fs::read_to_string(folder.path().join("set/dataset.toml")).unwrap();
+    assert!(manifest.contains("fill_gaps_s = 3.0"), "{manifest}");
+    let (code, _, stderr) = host_fit(&["import", &log, "-o", &at("next"), "--like", &set]);
+    assert_eq!(code, Some(0), "{stderr}");
+}
+
 /// Records with too little data are refused with their file, and a wrong value of an on/off command with its line.
 #[test]
 fn what_a_fit_cannot_use_is_refused_with_its_file() {

@@ -214,7 +214,7 @@ pub enum DataProblem {
     /// An empty cell.
     #[error(
         "the value is missing; fill it in, or split the record there (`host-fit import` repeats a u that is \
-             written only when it changes)"
+             written only when it changes, and interpolates short gaps with --fill-gaps SECONDS)"
     )]
     MissingValue,
     /// Text where a number belongs.
@@ -242,8 +242,8 @@ pub enum DataProblem {
     /// Samples are missing.
     #[error(
         "time jumps by {step} s where the sampling period is {period} s: about {missing} sample(s) missing; \
-             split the record there or fill the gap (if only the times are wrong: `host-fit import` with \
-             --period SECONDS --ignore-time)"
+             split the record there, or `host-fit import` it with --fill-gaps SECONDS (if only the times are \
+             wrong: with --period SECONDS --ignore-time)"
     )]
     TimeGap {
         /// The step found.

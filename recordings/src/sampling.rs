@@ -155,6 +155,43 @@ impl PrintedTimes {
         }
     }
 
+    /// The number of rows lost before each row: a step of a whole multiple of the period misses the rows between.
+    /// `None` if no row is lost, or if the rounding of the printed times explains more than one long step.
+    pub(crate) fn lost_rows(&self, stated: Option<Stated>) -> Option<Vec<f64>> {
+        let is_gap = |fault: &TimeFault| matches!(fault.problem, DataProblem::TimeGap { .. });
+        let by_steps = self.period_of_steps(stated);
+        if !by_steps.is_err_and(|fault| is_gap(&fault))
+            || self.rounded().is_some_and(|r| r.uncommon > 1) && self.clock(stated).is_ok()
+        {
+            return None;
+        }
+        let steps: Vec<f64> = self.time.windows(2).map(|w| w[1] - w[0]).collect();
+        let mut sorted = steps.clone();
+        let middle = sorted.len() / 2;
+        let median = *sorted.select_nth_unstable_by(middle, f64::total_cmp).1;
+        let rounding = |row: usize| self.unit[row - 1].max(self.unit[row]);
+        // The mean of the regular steps: the median is rounded like the printed times.
+        let regular = (1..).zip(&steps);
+        let regular = regular
+            .filter(|&(row, s)| (s - median).abs() <= tolerance(median, rounding(row)))
+            .fold((0.0, 0.0), |(sum, count), (_, s)| (sum + s, count + 1.0));
+        let period = stated.map_or(regular.0 / regular.1, |s| s.period_s);
+        let lost = |(row, step): (usize, &f64)| {
+            let periods = (step / period).round();
+            let is_whole = (step - periods * period).abs() <= tolerance(period, rounding(row));
+            if is_whole {
+                (periods - 1.0).max(0.0)
+            } else {
+                0.0
+            }
+        };
+        Some(
+            std::iter::once(0.0)
+                .chain((1..).zip(&steps).map(lost))
+                .collect(),
+        )
+    }
+
     fn period_of_steps(&self, stated: Option<Stated>) -> Result<f64, TimeFault> {
         let n = self.time.len();
         if n < 2 {
@@ -354,6 +391,36 @@ mod tests {
             slightly.problem,
             DataProblem::PeriodMismatch { .. }
         ));
+    }
+
+    #[test]
+    fn lost_rows_are_counted_where_a_step_is_a_multiple_of_the_period() {
+        let without = |mut times: PrintedTimes, rows: &[usize]| {
+            for &row in rows.iter().rev() {
+                times.time.remove(row);
+                times.unit.remove(row);
+            }
+            times
+        };
+        let found = |times: &PrintedTimes, stated| -> Vec<(usize, f64)> {
+            let lost = times.lost_rows(stated).unwrap_or_default();
+            (0..).zip(lost).filter(|(_, lost)| *lost > 0.0).collect()
+        };
+        // 9.9 ms in whole milliseconds: a long gap is not counted in median steps of 10 ms.
+        let long: Vec<usize> = (200..320).collect();
+        let times = without(printed(1000, 0.0099, 3), &[&[40, 41], &long[..]].concat());
+        assert_eq!(found(&times, None), [(40, 2.0), (198, 120.0)]);
+        // One lost row of a clock of whole seconds, whose rounding would explain it; more are rounding.
+        let times = without(whole(600, 1.0, 1.0, 0.0), &[300]);
+        assert_eq!(found(&times, None), [(300, 1.0)]);
+        assert_eq!(found(&whole(600, 1.01, 1.0, 0.0), None), []);
+        let times = without(whole(600, 1.0, 1.0, 0.0), &[200, 400]);
+        assert_eq!(found(&times, None), []);
+        assert_eq!(found(&times, stated(1.0)), [(200, 1.0), (399, 1.0)]);
+        // A step of 2.4 periods is uneven.
+        let mut times = printed(100, 1.0, 3);
+        times.time.iter_mut().skip(50).for_each(|t| *t += 1.4);
+        assert_eq!(found(&times, None), []);
     }
 
     /// Times of a clock with this period, printed in whole units.

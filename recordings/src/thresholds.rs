@@ -10,6 +10,8 @@ crate::rules! {
     most_uneven: f64 = 0.6, "share of the period", "a missing sample makes a difference of 1";
     /// The mean step may differ from a stated period by this.
     clock: f64 = 1e-3, "share of the period", "judgement: clock differences of a rig are smaller";
+    /// `import --fill-gaps` inserts lost rows up to this share of the rows in the file.
+    lost: f64 = 0.1, "share of the rows", "judgement: more gaps are the rounding of a coarse clock";
     /// Times printed in this or a coarser unit count as rounded if rounding explains every step.
     coarse_s: f64 = 1.0, "s", "judgement: loggers with stamps of whole seconds";
     /// Times printed in a finer unit count as rounded only if at least this many steps differ from the most

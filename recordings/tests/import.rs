@@ -320,6 +320,7 @@ proptest! {
         which in 0..FILES.len(),
         changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 0..12),
         cut in prop::option::of(any::<prop::sample::Index>()),
+        fill_gaps_s in prop::option::of(0.002..1e9),
     ) {
         let mut bytes = fs::read(file(FILES[which])).unwrap();
         for (at, value) in changes {
@@ -332,7 +333,7 @@ proptest! {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join(FILES[which]);
         fs::write(&path, &bytes).unwrap();
-        let mapping = Mapping { u_threshold: Some(2.5), period_s: Some(0.001), ..Mapping::default() };
+        let mapping = Mapping { u_threshold: Some(2.5), period_s: Some(0.001), fill_gaps_s, ..Mapping::default() };
         match import(&[&path], &Import { mapping, ..Import::default() }) {
             Ok(found) => prop_assert!(found.set.records[0].len() >= 2),
             Err(error) => {

@@ -340,7 +340,7 @@ fn what_is_not_read_is_named_by_its_cell() {
     );
     refused(
         "t,u,y\n0,0,21\n1,1,\n2,0,22\n",
-        &["line 3, column `y`", "empty"],
+        &["line 3, column `y`", "empty", "--fill-gaps SECONDS"],
     );
     refused(
         "t,u,y\n0,,21\n1,1,21\n2,0,22\n",
@@ -350,7 +350,7 @@ fn what_is_not_read_is_named_by_its_cell() {
     refused("u,y\n1,HOT\n", &["line 2", "`HOT`", "no rows of numbers"]);
     refused(
         "t,u,y\n0,0,1\n1,1,1\n2,0,1\n3,0,1\n7,0,1\n8,0,1\n",
-        &["column `t`", "missing", "--ignore-time"],
+        &["column `t`", "missing", "--fill-gaps", "--ignore-time"],
     );
     let found = parsed("t,u,y,mode\n0,0,21,AUTO\n1,1,21,AUTO\n2,0,22,MAN\n");
     let remarks = found.files[0].remarks.join("\n");
@@ -358,6 +358,109 @@ fn what_is_not_read_is_named_by_its_cell() {
         remarks.contains("`mode` is left out: its cell in line 2 reads `AUTO`"),
         "{remarks}"
     );
+}
+
+/// A file of 40 rows every 0.1 s, with these rows instead (empty: lost).
+fn with_rows(instead: &[(usize, &str)]) -> String {
+    let row = |k: usize| match instead.iter().find(|(row, _)| *row == k) {
+        Some((_, text)) => (*text).to_owned(),
+        None => format!("{:.3},{},{},5\n", 0.1 * k as f64, k / 5 % 2, 2 * k),
+    };
+    (0..40)
+        .map(row)
+        .fold("t,u,y,fan\n".to_owned(), |all, row| all + &row)
+}
+
+#[test]
+fn short_gaps_are_filled_and_long_ones_named() {
+    let filled = |fill_gaps_s: f64, instead: &[(usize, &str)]| {
+        let mapping = Mapping {
+            fill_gaps_s: Some(fill_gaps_s),
+            channels: Some(vec!["fan".to_owned()]),
+            ..Mapping::default()
+        };
+        let request = Import {
+            mapping,
+            ..Import::default()
+        };
+        text("run.csv", &with_rows(instead), &request)
+    };
+    let whole = filled(0.3, &[]).unwrap();
+    assert!(whole.files[0].remarks.is_empty());
+    // Two lost rows, a value that is missing beside them, marks in u and in a channel.
+    let lost = [(3, "0.3,NaN,6,5\n"), (6, ""), (7, ""), (12, "1.2,0,,n/a\n")];
+    let found = filled(0.3, &lost).unwrap();
+    let (record, all) = (&found.set.records[0], &whole.set.records[0]);
+    assert_eq!((record.u.clone(), record.len()), (all.u.clone(), 40));
+    let is_linear = record
+        .y
+        .iter()
+        .zip(&all.y)
+        .all(|(a, b)| (a - b).abs() < 1e-9);
+    assert!(
+        is_linear && record.channels == all.channels,
+        "{:?}",
+        record.y
+    );
+    assert_eq!(
+        found.files[0].remarks,
+        [
+            "2 missing row(s) are inserted (before line 8): u keeps its last value, the others are interpolated",
+            "`y`: 1 of 38 values are interpolated (line 12)",
+            "`u`: 1 of 38 values are repeated (line 5)",
+            "`fan`: 1 of 38 values are interpolated (line 12)",
+        ]
+    );
+    // Later errors name the line of the file, also behind inserted rows.
+    let late = filled(0.3, &[(6, ""), (15, "1.5,1,1e300,5\n")]).unwrap_err();
+    assert!(late.contains("line 16, column `y`"), "{late}");
+
+    for (most_s, instead, parts) in [
+        (
+            0.25,
+            &lost[..],
+            [
+                "line 8, column `t`",
+                "lasts 0.3 s, longer than --fill-gaps 0.25",
+            ],
+        ),
+        // The gap of y goes on beside the lost rows.
+        (
+            0.35,
+            &[(5, "0.5,1,,5\n"), lost[1], lost[2]],
+            ["line 7, column `y`", "give --fill-gaps 0.4"],
+        ),
+        (
+            1.0,
+            &[(0, "0.0,0,,5\n")],
+            ["line 2, column `y`", "at the start"],
+        ),
+        (
+            1.0,
+            &[(38, "3.8,1,3,\n"), (39, "3.9,1,3,\n")],
+            ["line 40, column `fan`", "at the end"],
+        ),
+        (
+            1.0,
+            &[lost[1], lost[2], (11, ""), (15, "")],
+            ["line 14, column `t`", "4 rows are missing"],
+        ),
+        (
+            1.0,
+            &[(6, ""), (7, "0.740,1,3,5\n")],
+            ["line 8, column `t`", "the time step is 0.24 s"],
+        ),
+        (
+            1.0,
+            &[(6, ",1,3,5\n")],
+            ["line 8, column `t`", "empty; fill it in, or split"],
+        ),
+    ] {
+        let error = filled(most_s, instead).unwrap_err();
+        for part in parts {
+            assert!(error.contains(part), "no `{part}` in: {error}");
+        }
+    }
 }
 
 #[test]

@@ -45,6 +45,10 @@ pub(crate) struct Args {
     /// Use --period as the spacing of the rows and ignore the file's time.
     #[arg(long, requires = "period")]
     ignore_time: bool,
+    /// Fill gaps up to this length, s, from the value before a gap to the value after it: missing values and lost
+    /// rows are interpolated, u keeps its value.
+    #[arg(long, value_name = "SECONDS", value_parser = positive)]
+    fill_gaps: Option<f64>,
     /// Variable that is the command.
     #[arg(long, value_name = "NAME")]
     u: Option<String>,
@@ -120,6 +124,7 @@ impl Args {
             t_scale: self.t_scale.or(base.t_scale),
             period_s: self.period.or(base.period_s),
             ignore_time: self.ignore_time || base.ignore_time,
+            fill_gaps_s: self.fill_gaps.or(base.fill_gaps_s),
             u: self.u.clone().or(base.u),
             u_scale: self.u_scale.or(base.u_scale),
             u_offset: self.u_offset.or(base.u_offset),

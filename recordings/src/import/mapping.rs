@@ -5,6 +5,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
+use super::gaps::{Filling, Gaps};
 use super::names::{
     COMMANDS, CONTROLLER_OUTPUTS, OUTPUTS, PROCESS_VALUES, TIMES, find, is_in_percent, known_as,
     only_other, only_switch,
@@ -31,6 +32,9 @@ pub struct Mapping {
     /// The rows are a sampling period apart, and the file's time is ignored.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub ignore_time: bool,
+    /// Longest gap that is filled, s, from the value before it to the value after it; `None`: no gap is filled.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fill_gaps_s: Option<f64>,
     /// The command; `None`: found by its name.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub u: Option<String>,
@@ -168,6 +172,7 @@ impl Mapping {
     fn check(&self) -> Result<(), ImportProblem> {
         for (value, name) in [
             (self.t_scale, "t_scale"),
+            (self.fill_gaps_s, "fill_gaps_s"),
             (self.u_scale, "u_scale"),
             (self.y_scale, "y_scale"),
         ] {
@@ -224,8 +229,18 @@ impl Mapping {
         same_length(y, n, &place)?;
 
         let timing = self.timing(source, n, &place, &mut mapping, &mut remarks)?;
-        finite(y, &place)?;
+        let gaps = Gaps {
+            most_s: self.fill_gaps_s,
+            period_s: timing.period_s,
+            rows: timing.rows,
+        };
+        let interpolated = |variable: &Variable, remarks: &mut Vec<String>| {
+            let values = &variable.values;
+            gaps.filled(variable, values, Filling::Interpolated, &place, remarks)
+        };
+        let measured = interpolated(y, &mut remarks)?;
         let values = held(u, &place, &mut remarks)?;
+        let values = gaps.filled(u, &values, Filling::Held, &place, &mut remarks)?;
         let u_scale = self.scale_of_command(u, &values, &mut remarks);
         mapping.u_scale = u_scale;
         let line = |scale: Option<f64>, offset: Option<f64>| {
@@ -257,11 +272,8 @@ impl Mapping {
                 brief((low + high) / 2.0, 1)
             ));
         }
-        let output = y
-            .values
-            .iter()
-            .map(line(self.y_scale, self.y_offset))
-            .collect();
+        let output = measured.iter().map(line(self.y_scale, self.y_offset));
+        let output = output.collect();
         let mut record = Record::new(name, role, timing.period_s, command, output);
         record.t0 = timing.t0;
 
@@ -290,21 +302,22 @@ impl Mapping {
                 ));
                 continue;
             }
-            if let Err(error) = finite(variable, &place) {
-                if self.channels.is_some() {
-                    return Err(error);
+            let values = match interpolated(variable, &mut remarks) {
+                Ok(values) => values,
+                Err(error) if self.channels.is_some() => return Err(error),
+                Err(error) => {
+                    let line = error.place.line.map(|line| format!("line {line}: "));
+                    remarks.push(format!(
+                        "`{}` is left out: {}{}",
+                        variable.name,
+                        line.unwrap_or_default(),
+                        error.problem
+                    ));
+                    continue;
                 }
-                let line = error.place.line.map(|line| format!("line {line}: "));
-                remarks.push(format!(
-                    "`{}` is left out: {}{}",
-                    variable.name,
-                    line.unwrap_or_default(),
-                    error.problem
-                ));
-                continue;
-            }
+            };
             remarks.extend(variable.notes.iter().cloned());
-            let values = variable.values.iter();
+            let values = values.iter();
             match variable.name.as_str() {
                 "y_sd" => record.y_sd = Some(values.map(|v| v * scale.abs()).collect()),
                 bound @ ("y_min" | "y_max") => {
@@ -342,6 +355,11 @@ impl Mapping {
         remarks.extend(unread.map(|u| format!("`{}` is left out: {}", u.name, u.words())));
         let passed_over = source.skipped.iter();
         remarks.extend(passed_over.map(|(name, why)| format!("`{name}` is left out: {why}")));
+        let lines = gaps.rows.iter().filter_map(|&row| source.lines.get(row));
+        let origin = Origin {
+            lines: lines.copied().collect(),
+            ..origin
+        };
         Ok(Mapped {
             record,
             origin,
@@ -407,13 +425,7 @@ fn held(
             values.len()
         ));
     }
-    match values.iter().position(|v| !v.is_finite()) {
-        None => Ok(values),
-        Some(k) => {
-            let value = values.get(k).copied().unwrap_or(f64::NAN);
-            Err(place(u, k).error(DataProblem::NotFinite(value)))
-        }
-    }
+    Ok(values)
 }
 
 /// Two values near which a command lies, if it is a noisy or scaled on/off command.

@@ -6,6 +6,7 @@
 mod cell;
 mod column;
 mod delimited;
+mod gaps;
 mod labelled;
 mod mapping;
 mod mat;

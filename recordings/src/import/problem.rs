@@ -54,6 +54,43 @@ pub enum ImportProblem {
     /// An unreadable cell of a required column.
     #[error("{}", unread(.0))]
     Unread(String),
+    /// A missing value.
+    #[error(
+        "the {what}; fill it in, split the record there, or fill short gaps with --fill-gaps SECONDS",
+        what = .0
+    )]
+    Missing(&'static str),
+    /// A missing value before the first or after the last value of its variable.
+    #[error(
+        "the value is missing at the {at} of the record, and --fill-gaps fills only between two values; fill \
+             it in, or remove the rows there",
+        at = .0
+    )]
+    MissingAtEnd(&'static str),
+    /// A gap that is too long to be filled.
+    #[error(
+        "the gap lasts {length_s} s, longer than --fill-gaps {most_s}; give --fill-gaps {length_s}, or split \
+             the file there"
+    )]
+    LongGap {
+        /// From the last value before it to the first after it, s.
+        length_s: f64,
+        /// The longest gap that is filled, s.
+        most_s: f64,
+    },
+    /// More lost rows than can be inserted.
+    #[error(
+        "at least {lost} rows are missing by the times, more than {share} % of the {rows} rows in the file, too many \
+             to fill; split the file at its gaps, or, if only the times are wrong, give --period SECONDS --ignore-time"
+    )]
+    ManyLost {
+        /// Lost rows.
+        lost: f64,
+        /// The largest share of the rows that is inserted, %.
+        share: f64,
+        /// Rows in the file.
+        rows: usize,
+    },
     /// A command written on change without a first value.
     #[error(
         "the first value of u is missing, although u is written only when it changes; write the value into this cell"

@@ -1,12 +1,13 @@
 //! Sampling times of a file: from a time column, from dates and clock times, or from a stated period.
 
+use super::gaps::{completed, inserted};
 use super::mapping::Mapping;
 use super::names::{TIMES, find, known_as, seconds, seconds_by_name};
 use super::problem::ImportProblem;
 use super::source::{Exactness, Source, Variable};
 use super::stamp::Kind;
-use crate::error::{DataError, FilePlace};
-use crate::sampling::{Clock, PrintedTimes, Rounded, Stated, tidy};
+use crate::error::{DataError, DataProblem, FilePlace};
+use crate::sampling::{Clock, PrintedTimes, Rounded, Stated, TimeFault, tidy};
 
 /// A time above this, s, is counted from 1970.
 const SINCE_1970: f64 = 1e9;
@@ -19,6 +20,8 @@ pub(super) struct Timing<'a> {
     pub(super) t0: f64,
     /// Sampling period, s.
     pub(super) period_s: f64,
+    /// The row of each sample in the file; a lost row has that of the row after it.
+    pub(super) rows: Vec<usize>,
 }
 
 /// Conversion of a time's numbers to seconds.
@@ -60,6 +63,7 @@ impl Mapping {
                 variables: variables.collect(),
                 t0: 0.0,
                 period_s,
+                rows: (0..n).collect(),
             });
         };
         found.period_s = None;
@@ -116,16 +120,33 @@ impl Mapping {
                 (times, t0)
             }
         };
-        let clock = times
-            .clock(stated)
-            .map_err(|f| place(time, f.row).error(f.problem))?;
+        let fault = |f: TimeFault| place(time, f.row).error(f.problem);
+        let filled = match self.fill_gaps_s {
+            Some(most_s) => completed(&times, stated, most_s).map_err(fault)?,
+            None => None,
+        };
+        let (times, rows) = filled.unwrap_or_else(|| (times, (0..n).collect()));
+        remarks.extend(inserted(&rows, time, place));
+        let clock = times.clock(stated).map_err(|f| {
+            let row = rows.get(f.row).copied().unwrap_or(f.row);
+            let problem = match f.problem {
+                // A gap that was not filled is no multiple of the period.
+                DataProblem::TimeGap { step, period, .. } if self.fill_gaps_s.is_some() => {
+                    DataProblem::TimeUneven { step, period }
+                }
+                other => other,
+            };
+            fault(TimeFault { row, problem })
+        })?;
         if let Some(rounded) = clock.rounded {
-            remarks.push(explained(&clock, &rounded, &times, source));
+            let line = rows.get(rounded.row).and_then(|&row| source.lines.get(row));
+            remarks.push(explained(&clock, &rounded, &times, line));
         }
         Ok(Timing {
             variables: [Some(time), date].into_iter().flatten().collect(),
             t0,
             period_s: clock.period_s,
+            rows,
         })
     }
 
@@ -263,7 +284,7 @@ fn scaled(t: &Variable, start: f64, scale: f64) -> PrintedTimes {
 }
 
 /// The remark on a clock whose uneven steps are explained by rounding.
-fn explained(clock: &Clock, rounded: &Rounded, times: &PrintedTimes, source: &Source) -> String {
+fn explained(clock: &Clock, rounded: &Rounded, times: &PrintedTimes, line: Option<&u64>) -> String {
     let (span, steps) = times.span();
     let mut text = format!(
         "times are printed in steps of {} s, so they step by {} to {} s. The sampling period is the mean, {} s \
@@ -275,10 +296,11 @@ fn explained(clock: &Clock, rounded: &Rounded, times: &PrintedTimes, source: &So
         clock.period_s
     );
     if rounded.uncommon == 1
-        && let Some(line) = source.lines.get(rounded.row)
+        && let Some(line) = line
     {
         text.push_str(&format!(
-            " (if a sample is missing before line {line}, the only uncommon step, split the file there)"
+            " (if a sample is missing before line {line}, the only uncommon step, split the file there or give \
+                 --fill-gaps SECONDS)"
         ));
     }
     text

@@ -75,6 +75,7 @@ impl Command {
             ],
             Self::Import => &[
                 "channel",
+                "fill-gaps",
                 "graded",
                 "hold-out-from",
                 "ignore-time",

@@ -29,7 +29,7 @@ mod visible;
 pub use average::average_files;
 pub use averaging::{Align, AverageError, AverageSummary, Averaging, Defect, Dropped};
 pub use error::{DataError, DataProblem, FilePlace};
-pub use record::{PERIODS_S, Record, Use};
+pub use record::{PERIODS_S, Record, Use, rounding_variance};
 pub use set::{DataSet, Plant};
 pub use table::InputFile;
 pub use thresholds::{RULES, Rules};

@@ -340,6 +340,22 @@ impl Origin {
     }
 }
 
+/// Variance of the rounding of readings y: Δ²/12, with Δ the smallest difference between two of them. 0 if all are equal.
+#[must_use]
+pub fn rounding_variance(y: &[f64]) -> f64 {
+    let mut sorted = y.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let steps = sorted.windows(2).map(|pair| pair[1] - pair[0]);
+    let least = steps
+        .filter(|step| *step > 0.0)
+        .fold(f64::INFINITY, f64::min);
+    if least.is_finite() {
+        least * least / 12.0
+    } else {
+        0.0
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -426,5 +442,14 @@ mod tests {
             })
             .contains("at least 2")
         );
+    }
+
+    #[test]
+    fn a_coarse_converter_rounds_and_a_fine_one_does_not() {
+        let smooth: Vec<f64> = (0..1000).map(|k| (k as f64 * 0.37).sin()).collect();
+        let coarse: Vec<f64> = smooth.iter().map(|y| (y / 0.25).round() * 0.25).collect();
+        assert!((rounding_variance(&coarse) - 0.25f64.powi(2) / 12.0).abs() < 1e-12);
+        assert!(rounding_variance(&smooth) < 1e-8);
+        assert_eq!(rounding_variance(&[3.0; 9]), 0.0);
     }
 }

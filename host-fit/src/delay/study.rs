@@ -179,6 +179,8 @@ struct Measurement {
     plant: Option<ResponsePlant>,
     /// The dead time of a plant that describes the records.
     dead_time: Option<DeadTime>,
+    /// Whether the response of that plant is significant over all edges together.
+    responds: bool,
     /// Standard error common to all edges, samples.
     common: f64,
 }
@@ -278,6 +280,7 @@ impl Measurement {
                 ratio: pooled.plant.ratio,
             }),
             dead_time: (method == DelayMethod::Trajectory).then_some(pooled.dead_time),
+            responds: pooled.responds,
             common,
         }
     }
@@ -303,6 +306,7 @@ impl Measurement {
             reach: options.reach.unwrap_or(spacing),
             plant: None,
             dead_time: None,
+            responds: false,
             common: 0.0,
         }
     }
@@ -445,9 +449,10 @@ pub fn study_delays(set: &DataSet, options: &DelayOptions) -> Result<DelayStudy,
     };
     let verdict = verdict.without_law(law.is_some());
     let statistics = statistics(&points, law.as_ref(), set, options.window);
+    // Under a binary sequence no response has time to be measured by itself.
     let dead_time = measurement
         .dead_time
-        .filter(|_| !learned.is_empty())
+        .filter(|_| measurement.responds || !learned.is_empty())
         .or_else(|| of(&|_| true));
     let words = words(verdict, &tests, &kept, law_not_kept.as_deref());
     let (rising, falling) = (of(&|e| e.edge.rising), of(&|e| !e.edge.rising));

@@ -1,11 +1,14 @@
 //! White noise of a record, and single samples that are no part of it.
 
+use crate::data::rounding_variance;
+
 /// A sample counts as an outlier if it is this many standard deviations of the white noise away from both neighbours.
 const OUTLIER: f64 = 6.0;
 
 /// Variance of white noise in some records, from the median of the squared second differences of y, to which
-/// responses contribute only in few samples.
-pub(crate) fn white_noise<'a>(records: impl Iterator<Item = &'a [f64]>) -> f64 {
+/// responses contribute only in few samples; at least that of the rounding of y, which may hide the noise.
+pub(crate) fn white_noise<'a>(records: impl Iterator<Item = &'a [f64]> + Clone) -> f64 {
+    let rounding = (records.clone().map(rounding_variance)).fold(0.0, f64::max);
     let differences = records.flat_map(|y| y.windows(3));
     let mut squares: Vec<f64> = differences
         .map(|w| (w[0] - 2.0 * w[1] + w[2]).powi(2) / 6.0)
@@ -16,7 +19,7 @@ pub(crate) fn white_noise<'a>(records: impl Iterator<Item = &'a [f64]>) -> f64 {
     }
     // The median of a squared normal deviate is 0.455 of its variance.
     let median = *squares.select_nth_unstable_by(middle, f64::total_cmp).1;
-    median / 0.455
+    (median / 0.455).max(rounding)
 }
 
 /// y with every outlier replaced by the mean of its neighbours. At an outlier y jumps and returns within one sample,

@@ -67,17 +67,33 @@ impl Session<'_> {
     /// Compares `last`, which has these effects, with the given model. `None` unless it has more evidence and fewer
     /// parameters.
     pub(super) fn parsimony(&self, last: &Hypothesis, effects: &[String]) -> Option<Parsimony> {
-        let count = |model: &Model| model.coordinates().len();
-        let terms_fewer = count(self.given).checked_sub(count(last.judged.model()))?;
-        if terms_fewer == 0 || effects.is_empty() {
+        if effects.is_empty() {
             return None;
         }
-        let nats = self.evidence_of(last.judged.model())? - self.evidence_of(self.given)?;
-        (nats > 0.0).then(|| Parsimony {
+        let (terms_fewer, nats) = self.leaner_than_given(last)?;
+        Some(Parsimony {
             effects: effects.to_vec(),
             nats,
             terms_fewer,
         })
+    }
+
+    /// By how many parameters `model` is leaner than the given model, and by how many nats it has more evidence. `None`
+    /// unless both are positive.
+    fn leaner_than_given(&self, model: &Hypothesis) -> Option<(usize, f64)> {
+        let count = |model: &Model| model.coordinates().len();
+        let fewer = count(self.given).checked_sub(count(model.judged.model()))?;
+        if fewer == 0 {
+            return None;
+        }
+        let nats = self.evidence_of(model.judged.model())? - self.evidence_of(self.given)?;
+        (nats > 0.0).then_some((fewer, nats))
+    }
+
+    /// Whether the given model imitates the effects of `model` with more parameters and less evidence. Its error is then
+    /// no measure of what the effects explain.
+    pub(super) fn given_imitates(&self, model: &Hypothesis) -> bool {
+        self.leaner_than_given(model).is_some()
     }
 
     /// ln of the evidence of a model at its most likely parameters, nats; `None` if its free run diverges. Several
@@ -107,7 +123,7 @@ impl Session<'_> {
         let effects = subject.terms.iter().filter_map(Term::effect);
         let names: Vec<&str> = effects.map(|effect| effect.name).collect();
         let nulls: Vec<Null> = std::iter::once(self.null(without)?)
-            .chain(self.given_without(&names))
+            .chain(self.given_without(subject, &names))
             .collect();
         self.certificate(subject, &nulls, found)
     }
@@ -122,14 +138,18 @@ impl Session<'_> {
         self.certificate(subject, &[self.null(without)?], found)
     }
 
-    /// The given model as a null model, unless it has one of these effects or diverges.
-    fn given_without(&self, effects: &[&str]) -> Option<Null> {
+    /// The given model as a null model for `subject`, unless it has one of these effects or diverges.
+    fn given_without(&self, subject: &Hypothesis, effects: &[&str]) -> Option<Null> {
         if effects.iter().any(|name| self.given.has_effect(name)) {
             return None;
         }
+        let excess = match self.given_imitates(subject) {
+            true => f64::INFINITY,
+            false => self.judge().excess(self.as_given),
+        };
         Some(Null {
             evidence: self.evidence_of(self.given)?,
-            excess: self.judge().excess(self.as_given),
+            excess,
         })
     }
 
@@ -213,7 +233,7 @@ impl Session<'_> {
             // Without the evidence of a null model nothing is certified.
             let nulls: Option<Vec<Null>> = places.into_iter().map(|at| nulls[at]).collect();
             let mut nulls = nulls?;
-            nulls.extend(self.given_without(&[&name]));
+            nulls.extend(self.given_without(subject, &[&name]));
             Some((name, self.certificate(subject, &nulls, found)?))
         });
         certificates.collect()
@@ -225,7 +245,7 @@ impl Session<'_> {
 struct Null {
     /// ln of the evidence, nats.
     evidence: f64,
-    /// Variance above the noise on the validation samples, y².
+    /// Variance above the noise on the validation samples, y²; infinite for a model that imitates the effects.
     excess: f64,
 }
 

@@ -183,7 +183,8 @@ impl Session<'_> {
             return of_bare();
         };
         // The share is counted from the best model without these effects, which may be the given one.
-        let without = match as_given.rmse() < bare.judged.rmse() {
+        let is_reference = as_given.rmse() < bare.judged.rmse() && !self.given_imitates(best);
+        let without = match is_reference {
             true => as_given,
             false => &bare.judged.held_out,
         };

@@ -2,7 +2,7 @@
 
 use super::explained::Errors;
 use super::rules::RULES;
-use crate::data::Record;
+use crate::data::{Record, rounding_variance};
 
 /// Where the noise level comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
@@ -25,6 +25,9 @@ pub(super) fn floor(records: &[&Record], residual: &[Vec<f64>]) -> (Vec<Vec<f64>
     if let Some(measured) = measured {
         return (measured, NoiseSource::Measured);
     }
+    // What is rounded away scatters neither from sample to sample nor between repeats.
+    let rounding = records.iter().map(|record| rounding_variance(&record.y));
+    let rounding = rounding.sum::<f64>() / records.len().max(1) as f64;
     let repeats: Vec<f64> = records.iter().filter_map(|r| by_repeats(r)).collect();
     let (variance, source) = if repeats.is_empty() {
         let each = residual
@@ -39,6 +42,7 @@ pub(super) fn floor(records: &[&Record], residual: &[Vec<f64>]) -> (Vec<Vec<f64>
         let mean = repeats.iter().sum::<f64>() / repeats.len() as f64;
         (mean, NoiseSource::Repeats)
     };
+    let variance = variance.max(rounding);
     let constant = residual.iter().map(|e| vec![variance; e.len()]).collect();
     (constant, source)
 }

@@ -462,3 +462,34 @@ fn an_integrator_has_a_dead_time() {
         with_noise(tank.collect(), deviates)
     });
 }
+
+/// Fourteen levels over the response: what is rounded away is noise that does not scatter from sample to sample.
+#[test]
+fn a_coarse_converter_does_not_hide_the_dead_time() {
+    all_within(8.0, 20.0, |u, deviates| {
+        let y = with_noise(respond(30.0, 4.0, 8.0, u, [0.0; 2]), deviates);
+        y.into_iter().map(|y| (y / 0.07).round() * 0.07).collect()
+    });
+}
+
+/// No response ends before the next edge, so that no edge is measured by itself.
+#[test]
+fn a_binary_sequence_has_a_dead_time() {
+    for seed in 0..6 {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let (mut u, mut level) = (Vec::new(), 0.0);
+        while u.len() < 3000 {
+            level = 1.0 - level;
+            u.extend(std::iter::repeat_n(level, rng.random_range(1..6)));
+        }
+        let deviates: Vec<f64> = (0..u.len())
+            .map(|_| StandardNormal.sample(&mut rng))
+            .collect();
+        let y = with_noise(respond(30.0, 0.0, 12.0, &u, [0.0; 2]), &deviates);
+        let study = study(vec![Record::new("r", Use::Identify, 0.1, u, y)]);
+        let found = study.dead_time.expect("the records respond as a whole");
+        assert!(study.rising.is_none() && study.falling.is_none());
+        let holds = found.low <= 12.0 && 12.0 <= found.high && found.high - found.low < 6.0;
+        assert!(holds, "seed {seed}: {found:?}");
+    }
+}

@@ -3,7 +3,7 @@
 use super::symptom::{meant, shown};
 use super::{Answer, Tone};
 use crate::data::Plant;
-use crate::diagnose::{Diagnosis, FLOW_LAG, FLOW_MEMORY, HeldOutBy, RULES, Rung, Verdict};
+use crate::diagnose::{Diagnosis, FLOW_LAG, FLOW_MEMORY, HeldOutBy, Memory, RULES, Rung, Verdict};
 use crate::discover::Glance;
 use crate::picture::{significant, time};
 use crate::residual::NoiseSource;
@@ -372,14 +372,26 @@ fn dynamics(answer: &mut Answer, diagnosis: &Diagnosis) {
             time(second, 2)
         ));
     }
-    for memory in &diagnosis.memory {
-        answer.note(format!(
-            "The plant has a memory of {} s, with weight {} while the command is off and {} while it is on.",
-            significant(memory.lag_s, 3),
-            significant(memory.weight, 2),
-            significant(memory.weight_blown, 2)
-        ));
-    }
+    let lags: Vec<String> = (diagnosis.memory.iter())
+        .map(|memory| significant(memory.lag_s, 3))
+        .collect();
+    let which = match lags.as_slice() {
+        [] => return,
+        [one] => format!("The plant has a memory of {one} s, with weight"),
+        // Neighbouring lags share one memory, so that only the sum of their weights is known.
+        [before @ .., last] => format!(
+            "The plant has memories of {} and {last} s, whose weights add up to",
+            before.join(", ")
+        ),
+    };
+    let sum = |weight: fn(&Memory) -> f64| -> String {
+        significant(diagnosis.memory.iter().map(weight).sum(), 2)
+    };
+    answer.note(format!(
+        "{which} {} while the command is off and {} while it is on.",
+        sum(|memory| memory.weight),
+        sum(|memory| memory.weight_blown)
+    ));
 }
 
 /// The bench check for candidates that records do not distinguish, because lags in series commute.

@@ -56,7 +56,7 @@ impl<T: Real> Physics<T> for VortexShedding<T> {
                 &[3.0, 6.0, 10.0, 16.0, 25.0, 40.0],
             ),
             // A larger damping ratio would give a lag, not an oscillation.
-            Parameter::new("damping_ratio", Unit::None, [0.005, 0.6], &[0.05, 0.2]),
+            Parameter::new("damping_ratio", Unit::None, [0.005, 0.3], &[0.05, 0.2]),
             Parameter::new("gain", Unit::Y, [-2.0, 2.0], &[0.15]),
         ],
         amplitude: Some(Amplitude::new("gain", "vortex shedding").linear()),

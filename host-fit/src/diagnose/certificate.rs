@@ -258,6 +258,52 @@ fn is_same(a: &Hypothesis, b: &Hypothesis) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::diagnose::Options;
+    use crate::residual::plants::{base, records};
+    use crate::terms::{Bench, Search};
+    use model_core::effects::spec;
+    use std::sync::Mutex;
+    use std::sync::atomic::AtomicBool;
+
+    /// Eight lags imitate a vortex behind every rising edge, with more parameters and less evidence. Neither a leaner
+    /// given model nor one with more evidence is an imitation.
+    #[test]
+    fn a_given_model_with_more_parameters_and_less_evidence_imitates() {
+        let records = records(&["starting-vortex"], &[], 3);
+        let bench = Bench::of(&base(&records), &records).expect("records to learn from");
+        let (judge, lean) = (&bench.judge, &bench.given);
+        let effect = Term::Effect {
+            spec: spec("starting-vortex").expect("in the catalogue"),
+            parameters: vec![0.5, 0.05],
+            grading: lean.grading,
+            reference: None,
+        };
+        let with_lags = Model {
+            state_lags: vec![1, 2, 4, 8, 16, 32, 64, 128],
+            a: [&lean.a[..1], &[0.0; 7]].concat(),
+            ..lean.clone()
+        };
+        let fitted = |model: &Model| Hypothesis::new(judge.refitted(model).expect("stable"));
+        let lagged = fitted(&with_lags);
+        let named = fitted(&effect.added_to(lean, &[]));
+        let bare = fitted(lean);
+        let interrupt = AtomicBool::new(false);
+        let search = Search::silent(judge, 1, &interrupt);
+        let imitates = |given: &Hypothesis, model: &Hypothesis| {
+            let session = Session {
+                search: &search,
+                units: bench.units,
+                options: &Options::default(),
+                given: given.judged.model(),
+                as_given: &given.judged.held_out,
+                evidences: Mutex::default(),
+            };
+            session.given_imitates(model)
+        };
+        assert!(imitates(&lagged, &named));
+        assert!(!imitates(&bare, &named));
+        assert!(!imitates(&lagged, &bare));
+    }
 
     /// ln(50) nats correspond to a p-value of 0.02; an e-value below 1 gives no information.
     #[test]

@@ -321,7 +321,7 @@ fn quantised(rng: &mut ChaCha8Rng) -> Drawn {
     let rig = Rig::draw_any_order(rng);
     let u = rig.switched(rng, 0.0, 3.0);
     let mut record = rig.record(u, rng);
-    let step = rig.plant.gain.abs() * rng.random_range(0.004..0.02);
+    let step = rig.plant.gain.abs() * logarithmic(rng, 0.004, 0.1);
     for y in &mut record.y {
         *y = (*y / step).round() * step;
     }
@@ -342,7 +342,7 @@ fn several(rng: &mut ChaCha8Rng, count: usize, apart: f64) -> Drawn {
 
 fn binary_sequence(rng: &mut ChaCha8Rng) -> Drawn {
     let rig = Rig::draw(rng);
-    let piece = (0.4 * rig.plant.lags[0]).max(4.0) as usize;
+    let piece = (logarithmic(rng, 0.05, 0.4) * rig.plant.lags[0]).max(2.0) as usize;
     let mut u = vec![0.0; 20];
     while u.len() < rig.samples {
         let now = f64::from(u8::from(chance(rng, 0.5)));

@@ -173,7 +173,8 @@ impl Line {
 
     /// Repeats `command` until the answer matches. A restarting board does not answer meanwhile.
     fn until(&mut self, command: &str, wanted: impl Fn(&str) -> bool) -> Result<String> {
-        let until = Instant::now() + Duration::from_secs(30);
+        // On a busy machine the emulated clock is slow.
+        let until = Instant::now() + Duration::from_secs(120);
         let mut last = String::new();
         while Instant::now() < until {
             self.send(&format!("\n{command}\n"))?;

@@ -87,7 +87,32 @@ const STEPS: &[Step] = &[
         room: None,
         run: || crate::browser::browser(&[]),
     },
-    // The emulated board, one after the other: the longest chain, so it starts first after the build.
+    Step {
+        name: "lints",
+        after: &[],
+        room: Some(Room::Host),
+        run: || {
+            run(&mut cargo(&[
+                "clippy",
+                "--release",
+                "--workspace",
+                "--all-targets",
+                "--",
+                "-Dwarnings",
+            ]))
+        },
+    },
+    Step {
+        name: "documentation",
+        after: &[],
+        room: Some(Room::Host),
+        run: || {
+            run(cargo(&["doc", "--release", "--workspace", "--no-deps"])
+                .env("RUSTDOCFLAGS", "-Dwarnings"))
+        },
+    },
+    // The emulated board, one step after the other: the longest chain, so it starts before what can run beside it, but not
+    // beside the tests, which take both cores.
     Step {
         name: "faults",
         after: &[SET_UP, BUILD],
@@ -121,30 +146,6 @@ const STEPS: &[Step] = &[
         after: &[SET_UP, BUILD],
         room: Some(Room::Firmware),
         run: demo_on_board,
-    },
-    Step {
-        name: "lints",
-        after: &[],
-        room: Some(Room::Host),
-        run: || {
-            run(&mut cargo(&[
-                "clippy",
-                "--release",
-                "--workspace",
-                "--all-targets",
-                "--",
-                "-Dwarnings",
-            ]))
-        },
-    },
-    Step {
-        name: "documentation",
-        after: &[],
-        room: Some(Room::Host),
-        run: || {
-            run(cargo(&["doc", "--release", "--workspace", "--no-deps"])
-                .env("RUSTDOCFLAGS", "-Dwarnings"))
-        },
     },
     Step {
         name: "msrv",

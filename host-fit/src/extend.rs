@@ -11,7 +11,7 @@ use crate::data::{Record, Use};
 use crate::diagnose::ParameterEstimate;
 use crate::fit::{
     CandidateError, Fit, FitOptions, RULES, channel_reference, fit, fit_with_effect, lean_base,
-    pieces,
+    pieces_of,
 };
 use crate::model::{Model, Start};
 use crate::preparation::Preparation;
@@ -154,10 +154,7 @@ pub fn extend(
     let cut: Vec<Record>;
     let learning = match restarted(model, records, prepared.reference.as_ref()) {
         Some(samples) => {
-            cut = learning
-                .iter()
-                .flat_map(|record| pieces(record, 0, samples))
-                .collect();
+            cut = pieces_of(learning, samples);
             cut.iter().collect()
         }
         None => learning,

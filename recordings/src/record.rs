@@ -340,20 +340,20 @@ impl Origin {
     }
 }
 
-/// Variance of the rounding of readings y: Δ²/12, with Δ the smallest difference between two of them. 0 if all are equal.
+/// Variance of the rounding of records' readings y, the mean of Δ²/12 over the records, with Δ the smallest difference
+/// between two readings of a record, in the unit of y. 0 without records, and for a record whose readings are all equal.
 #[must_use]
-pub fn rounding_variance(y: &[f64]) -> f64 {
-    let mut sorted = y.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    let steps = sorted.windows(2).map(|pair| pair[1] - pair[0]);
-    let least = steps
-        .filter(|step| *step > 0.0)
-        .fold(f64::INFINITY, f64::min);
-    if least.is_finite() {
-        least * least / 12.0
-    } else {
-        0.0
+pub fn rounding_variance<'a>(records: impl Iterator<Item = &'a [f64]>) -> f64 {
+    let (mut sum, mut count) = (0.0, 0.0);
+    for y in records {
+        let mut sorted = y.to_vec();
+        sorted.sort_by(f64::total_cmp);
+        let steps = sorted.windows(2).map(|pair| pair[1] - pair[0]);
+        let least = steps.filter(|step| *step > 0.0).reduce(f64::min);
+        sum += least.unwrap_or(0.0).powi(2) / 12.0;
+        count += 1.0;
     }
+    sum / f64::max(count, 1.0)
 }
 
 #[cfg(test)]
@@ -448,8 +448,11 @@ mod tests {
     fn a_coarse_converter_rounds_and_a_fine_one_does_not() {
         let smooth: Vec<f64> = (0..1000).map(|k| (k as f64 * 0.37).sin()).collect();
         let coarse: Vec<f64> = smooth.iter().map(|y| (y / 0.25).round() * 0.25).collect();
-        assert!((rounding_variance(&coarse) - 0.25f64.powi(2) / 12.0).abs() < 1e-12);
-        assert!(rounding_variance(&smooth) < 1e-8);
-        assert_eq!(rounding_variance(&[3.0; 9]), 0.0);
+        let of = |records: &[&[f64]]| rounding_variance(records.iter().copied());
+        let known = 0.25f64.powi(2) / 12.0;
+        assert!((of(&[&coarse]) - known).abs() < 1e-12);
+        assert!(of(&[&smooth]) < 1e-8);
+        assert!((of(&[&coarse, &[3.0; 9]]) - known / 2.0).abs() < 1e-12);
+        assert_eq!(of(&[]), 0.0);
     }
 }

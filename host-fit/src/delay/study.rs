@@ -177,10 +177,8 @@ struct Measurement {
     max_delay: usize,
     reach: usize,
     plant: Option<ResponsePlant>,
-    /// The dead time of a plant that describes the records.
+    /// The dead time of a plant that describes the records and responds.
     dead_time: Option<DeadTime>,
-    /// Whether the response of that plant is significant over all edges together.
-    responds: bool,
     /// Standard error common to all edges, samples.
     common: f64,
 }
@@ -279,8 +277,9 @@ impl Measurement {
                 time_constants_off: pooled.plant.sum[1],
                 ratio: pooled.plant.ratio,
             }),
-            dead_time: (method == DelayMethod::Trajectory).then_some(pooled.dead_time),
-            responds: pooled.responds,
+            // Under a binary sequence no edge is measured by itself, but all together are.
+            dead_time: (method == DelayMethod::Trajectory && pooled.responds)
+                .then_some(pooled.dead_time),
             common,
         }
     }
@@ -306,7 +305,6 @@ impl Measurement {
             reach: options.reach.unwrap_or(spacing),
             plant: None,
             dead_time: None,
-            responds: false,
             common: 0.0,
         }
     }
@@ -449,11 +447,7 @@ pub fn study_delays(set: &DataSet, options: &DelayOptions) -> Result<DelayStudy,
     };
     let verdict = verdict.without_law(law.is_some());
     let statistics = statistics(&points, law.as_ref(), set, options.window);
-    // Under a binary sequence no response has time to be measured by itself.
-    let dead_time = measurement
-        .dead_time
-        .filter(|_| measurement.responds || !learned.is_empty())
-        .or_else(|| of(&|_| true));
+    let dead_time = measurement.dead_time.or_else(|| of(&|_| true));
     let words = words(verdict, &tests, &kept, law_not_kept.as_deref());
     let (rising, falling) = (of(&|e| e.edge.rising), of(&|e| !e.edge.rising));
     Ok(DelayStudy {

@@ -8,7 +8,7 @@ const OUTLIER: f64 = 6.0;
 /// Variance of white noise in some records, from the median of the squared second differences of y, to which
 /// responses contribute only in few samples; at least that of the rounding of y, which may hide the noise.
 pub(crate) fn white_noise<'a>(records: impl Iterator<Item = &'a [f64]> + Clone) -> f64 {
-    let rounding = (records.clone().map(rounding_variance)).fold(0.0, f64::max);
+    let rounding = rounding_variance(records.clone());
     let differences = records.flat_map(|y| y.windows(3));
     let mut squares: Vec<f64> = differences
         .map(|w| (w[0] - 2.0 * w[1] + w[2]).powi(2) / 6.0)

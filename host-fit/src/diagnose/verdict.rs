@@ -182,7 +182,8 @@ impl Session<'_> {
         let Some(certificate) = certificate else {
             return of_bare();
         };
-        // The share is counted from the best model without these effects, which may be the given one.
+        // The share is counted from the best model without these effects, which may be the given one. It is that of the
+        // certificate, except where the given model has one of the effects already.
         let is_reference = as_given.rmse() < bare.judged.rmse() && !self.given_imitates(best);
         let without = match is_reference {
             true => as_given,

@@ -26,6 +26,17 @@ fn remembers(model: &Model, samples: usize) -> bool {
         .is_ok_and(|pole| left(pole) > RULES.drifts)
 }
 
+/// The pieces of whole records.
+pub(crate) fn pieces_of<'r>(
+    records: impl IntoIterator<Item = &'r Record>,
+    samples: usize,
+) -> Vec<Record> {
+    let records = records.into_iter();
+    records
+        .flat_map(|record| pieces(record, 0, samples))
+        .collect()
+}
+
 /// A record from sample `first` on, cut into pieces of this many scored samples. Each piece is preceded by samples in
 /// which the run follows the measurement; the remainder belongs to the last piece.
 pub(crate) fn pieces(record: &Record, first: usize, samples: usize) -> Vec<Record> {

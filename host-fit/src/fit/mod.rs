@@ -12,8 +12,8 @@ mod starts;
 
 pub(crate) use candidate::channel_reference;
 pub use candidate::{CandidateError, fit_with_effect};
-pub(crate) use drift::pieces;
 pub use drift::restart_after;
+pub(crate) use drift::{pieces, pieces_of};
 pub use free_run::{Fit, FitOptions, fit, sensitivities};
 pub use lean::{lean_base, settle_fixed_delay};
 pub use level_scatter::LevelScatter;

@@ -26,8 +26,7 @@ pub(super) fn floor(records: &[&Record], residual: &[Vec<f64>]) -> (Vec<Vec<f64>
         return (measured, NoiseSource::Measured);
     }
     // What is rounded away scatters neither from sample to sample nor between repeats.
-    let rounding = records.iter().map(|record| rounding_variance(&record.y));
-    let rounding = rounding.sum::<f64>() / records.len().max(1) as f64;
+    let rounding = rounding_variance(records.iter().map(|record| record.y.as_slice()));
     let repeats: Vec<f64> = records.iter().filter_map(|r| by_repeats(r)).collect();
     let (variance, source) = if repeats.is_empty() {
         let each = residual

@@ -311,7 +311,8 @@ fn records(answer: &mut Answer, diagnosis: &Diagnosis, judged_rmse: Option<f64>)
             "The noise level was estimated from repeats of the command, because there is no `y_sd`.",
         ),
         NoiseSource::Scatter => answer.note(format!(
-            "The noise level is unknown: no `y_sd`, no repeated command. The noise from one sample to the next, rounding included, is {}.",
+            "The noise level is unknown: no `y_sd`, no repeated command. The noise from one sample to the \
+             next, rounding included, is {}.",
             significant(diagnosis.noise_estimate, 3)
         )),
     }

@@ -4,7 +4,7 @@ use super::RULES;
 use super::judge::Judge;
 use super::units::Units;
 use crate::data::{Record, Use};
-use crate::fit::{FitOptions, pieces, restart_after};
+use crate::fit::{FitOptions, pieces_of, restart_after};
 use crate::model::Model;
 use crate::preparation::{FirstOrder, MovingZero, Preparation, RULES as PREPARATION};
 
@@ -69,9 +69,7 @@ pub(crate) fn restarted(
     });
     let drifts = |samples: &usize| {
         let learning = || records.iter().filter(|record| record.role == Use::Identify);
-        let cut: Vec<Record> = learning()
-            .flat_map(|record| pieces(record, 0, *samples))
-            .collect();
+        let cut = pieces_of(learning(), *samples);
         // An integrator keeps the noise of its first sample: the mean of a whole run is no drift.
         mean_square(model, learning(), true) > mean_square(model, cut.iter(), false)
     };

@@ -3,7 +3,7 @@
 
 use super::RULES;
 use crate::data::{Record, Use};
-use crate::fit::pieces;
+use crate::fit::{pieces, pieces_of};
 
 /// One split into estimation and validation samples.
 #[derive(Clone, Debug)]
@@ -40,11 +40,7 @@ impl Fold {
         let judging = (self.judging.iter())
             .flat_map(|judging| pieces(&judging.record, judging.from, samples));
         Self {
-            learning: self
-                .learning
-                .iter()
-                .flat_map(|record| pieces(record, 0, samples))
-                .collect(),
+            learning: pieces_of(&self.learning, samples),
             judging: judging.map(|record| Judging { record, from: 0 }).collect(),
         }
     }

@@ -4,7 +4,7 @@ use super::RULES;
 use super::evidence::{HeldOut, p_above_noise};
 use super::folds::{Fold, HeldOutBy, Judging, folds};
 use crate::data::{Record, Use};
-use crate::fit::{Fit, FitOptions, LevelScatter, fit, pieces};
+use crate::fit::{Fit, FitOptions, LevelScatter, fit, pieces_of};
 use crate::linalg::dot;
 use crate::model::Model;
 use crate::parallel;
@@ -94,10 +94,7 @@ impl Judge {
         if let Some(samples) = restarted {
             whole_runs = Some(folds.clone());
             folds = folds.iter().map(|fold| fold.restarted(samples)).collect();
-            identify = identify
-                .iter()
-                .flat_map(|record| pieces(record, 0, samples))
-                .collect();
+            identify = pieces_of(&identify, samples);
         }
         if folds.is_empty() {
             return None;

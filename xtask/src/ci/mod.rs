@@ -111,8 +111,7 @@ const STEPS: &[Step] = &[
                 .env("RUSTDOCFLAGS", "-Dwarnings"))
         },
     },
-    // The emulated board, one step after the other: the longest chain, so it starts before what can run beside it, but not
-    // beside the tests, which take both cores.
+    // The emulated board, one step after the other: the longest chain, so it starts before what can run beside it.
     Step {
         name: "faults",
         after: &[SET_UP, BUILD],

@@ -50,7 +50,7 @@ const PLACES: [Holes; 3] = [
             ("Room", "Nozzle"),
             ("Kind", "Jet"),
             ("Part", "JetPart"),
-            ("piece", "Piece, "),
+            ("piece", "Piece"),
             (
                 "part",
                 "    fn jump(&mut self, _t: f64, _from: f64, to: f64) -> f64 {

@@ -1,37 +1,17 @@
 //! Saturation by the fifth power of the friction.
 
-use rand::RngExt;
-use rand_chacha::ChaCha8Rng;
+use crate::plant::effects::AmplitudeSaturation;
+use crate::plant::effects::physics;
+use crate::plant::part::{FlowPart, Part};
 
-use crate::plant::base::BasePlant;
-use crate::plant::effects::{AmplitudeSaturation, Card, Limits, Physics};
-use crate::plant::part::{FlowPart, Part, Place, Surroundings};
-
-/// −γ·s⁵ in the drive.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FifthPower {
-    /// γ (1/y⁴).
-    pub coefficient: f64,
-}
-
-impl Physics for FifthPower {
-    const NAME: &'static str = "fifth-power";
-    const RESEMBLES: &'static str = AmplitudeSaturation::NAME;
-    const PLACE: Place = Place::Flow;
-    const PARAMETERS: &'static [Card<Self>] =
-        &[Card::new("coefficient", "1/y⁴", Limits::FINITE, |e| {
-            &mut e.coefficient
-        })];
-
-    fn draw(_base: &BasePlant, rng: &mut ChaCha8Rng) -> Self {
-        Self {
-            coefficient: rng.random_range(0.3..2.0),
-        }
+physics! {
+    /// −γ·s⁵ in the drive.
+    FifthPower = "fifth-power" at Flow, like AmplitudeSaturation
+    parameters(_, rng) {
+        /// γ.
+        coefficient ["1/y⁴", FINITE] = rng.random_range(0.3..2.0);
     }
-
-    fn part(&self, _surroundings: &Surroundings<'_>) -> Part {
-        Part::Flow(Box::new(*self))
-    }
+    part(law, _) { Part::Flow(Box::new(*law)) }
 }
 
 impl FlowPart for FifthPower {

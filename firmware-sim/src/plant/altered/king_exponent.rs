@@ -1,46 +1,22 @@
 //! King's law with another exponent than one third.
 
-use rand::RngExt;
-use rand_chacha::ChaCha8Rng;
+use crate::plant::base::log_uniform;
+use crate::plant::effects::HotFilmNonlinearity;
+use crate::plant::effects::physics;
+use crate::plant::part::{Part, SensorPart};
 
-use crate::plant::base::{BasePlant, log_uniform};
-use crate::plant::effects::{Card, HotFilmNonlinearity, Limits, Physics};
-use crate::plant::part::{Part, Place, SensorPart, Surroundings};
-
-/// E = √(1 + κ·(s + s0)ⁿ), normalised to keep 0 and 1.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct KingExponent {
-    /// κ (-).
-    pub king_ratio: f64,
-    /// s0 (y).
-    pub king_offset: f64,
-    /// n (-).
-    pub exponent: f64,
-}
-
-impl Physics for KingExponent {
-    const NAME: &'static str = "king-exponent";
-    const RESEMBLES: &'static str = HotFilmNonlinearity::NAME;
-    const PLACE: Place = Place::Film;
-    const PARAMETERS: &'static [Card<Self>] = &[
-        Card::new("king_ratio", "-", Limits::POSITIVE, |e| &mut e.king_ratio),
-        Card::new("king_offset", "y", Limits::NOT_NEGATIVE, |e| {
-            &mut e.king_offset
-        }),
-        Card::new("exponent", "-", Limits::POSITIVE, |e| &mut e.exponent),
-    ];
-
-    fn draw(_base: &BasePlant, rng: &mut ChaCha8Rng) -> Self {
-        Self {
-            king_ratio: log_uniform(rng, 0.4, 4.0),
-            king_offset: log_uniform(rng, 0.02, 0.15),
-            exponent: rng.random_range(0.28..0.50),
-        }
+physics! {
+    /// E = √(1 + κ·(s + s0)ⁿ), normalised to keep 0 and 1.
+    KingExponent = "king-exponent" at Film, like HotFilmNonlinearity
+    parameters(_, rng) {
+        /// κ.
+        king_ratio ["-", POSITIVE] = log_uniform(rng, 0.4, 4.0);
+        /// s0.
+        king_offset ["y", NOT_NEGATIVE] = log_uniform(rng, 0.02, 0.15);
+        /// n.
+        exponent ["-", POSITIVE] = rng.random_range(0.28..0.50);
     }
-
-    fn part(&self, _surroundings: &Surroundings<'_>) -> Part {
-        Part::Sensor(Box::new(*self))
-    }
+    part(law, _) { Part::Sensor(Box::new(*law)) }
 }
 
 impl KingExponent {

@@ -2,45 +2,24 @@
 
 use std::collections::VecDeque;
 
-use rand::RngExt;
-use rand_chacha::ChaCha8Rng;
+use crate::plant::effects::ValveLag;
+use crate::plant::effects::physics;
+use crate::plant::part::{JetPart, Part, Piece};
 
-use crate::plant::base::BasePlant;
-use crate::plant::effects::{Card, Limits, Physics, ValveLag};
-use crate::plant::part::{JetPart, Part, Piece, Place, Surroundings};
-
-/// After a dead time the opening moves to the commanded level at constant speed.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct RampValve {
-    /// Dead time (s).
-    pub dead_time: f64,
-    /// Time from closed to open (s).
-    pub opening_time: f64,
-    /// Time from open to closed (s).
-    pub closing_time: f64,
-}
-
-impl Physics for RampValve {
-    const NAME: &'static str = "ramp-valve";
-    const RESEMBLES: &'static str = ValveLag::NAME;
-    const PLACE: Place = Place::Valve;
-    const PARAMETERS: &'static [Card<Self>] = &[
-        Card::new("dead_time", "s", Limits::TRAVEL, |e| &mut e.dead_time),
-        Card::new("opening_time", "s", Limits::TIME, |e| &mut e.opening_time),
-        Card::new("closing_time", "s", Limits::TIME, |e| &mut e.closing_time),
-    ];
-
-    fn draw(_base: &BasePlant, rng: &mut ChaCha8Rng) -> Self {
-        Self {
-            dead_time: rng.random_range(0.002..0.008),
-            opening_time: rng.random_range(0.020..0.045),
-            closing_time: rng.random_range(0.025..0.070),
-        }
+physics! {
+    /// After a dead time the opening moves to the commanded level at constant speed.
+    RampValve = "ramp-valve" at Valve, like ValveLag
+    parameters(_, rng) {
+        /// Dead time.
+        dead_time ["s", TRAVEL] = rng.random_range(0.002..0.008);
+        /// Time from closed to open.
+        opening_time ["s", TIME] = rng.random_range(0.020..0.045);
+        /// Time from open to closed.
+        closing_time ["s", TIME] = rng.random_range(0.025..0.070);
     }
-
-    fn part(&self, _surroundings: &Surroundings<'_>) -> Part {
+    part(law, _) {
         Part::Jet(Box::new(Valve {
-            law: *self,
+            law: *law,
             target: 0.0,
             opening: 0.0,
             waiting: VecDeque::new(),

@@ -2,44 +2,23 @@
 
 use std::f64::consts::TAU;
 
-use rand::RngExt;
-use rand_chacha::ChaCha8Rng;
+use crate::plant::effects::ValveLag;
+use crate::plant::effects::physics;
+use crate::plant::part::{JetPart, Part, Piece};
 
-use crate::plant::base::BasePlant;
-use crate::plant::effects::{Card, Limits, Physics, ValveLag};
-use crate::plant::part::{JetPart, Part, Piece, Place, Surroundings};
-
-/// v̈ = ω²·(u − v) − 2ζω·v̇.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SecondOrderValve {
-    /// Undamped natural frequency (Hz).
-    pub frequency: f64,
-    /// ζ (-).
-    pub damping_ratio: f64,
-}
-
-impl Physics for SecondOrderValve {
-    const NAME: &'static str = "second-order-valve";
-    const RESEMBLES: &'static str = ValveLag::NAME;
-    const PLACE: Place = Place::Valve;
-    const PARAMETERS: &'static [Card<Self>] = &[
-        Card::new("frequency", "Hz", Limits::POSITIVE, |e| &mut e.frequency),
-        Card::new("damping_ratio", "-", Limits::NOT_NEGATIVE, |e| {
-            &mut e.damping_ratio
-        }),
-    ];
-
-    fn draw(_base: &BasePlant, rng: &mut ChaCha8Rng) -> Self {
-        Self {
-            frequency: rng.random_range(6.0..16.0),
-            damping_ratio: rng.random_range(0.7..1.1),
-        }
+physics! {
+    /// v̈ = ω²·(u − v) − 2ζω·v̇.
+    SecondOrderValve = "second-order-valve" at Valve, like ValveLag
+    parameters(_, rng) {
+        /// Undamped natural frequency.
+        frequency ["Hz", POSITIVE] = rng.random_range(6.0..16.0);
+        /// ζ.
+        damping_ratio ["-", NOT_NEGATIVE] = rng.random_range(0.7..1.1);
     }
-
-    fn part(&self, _surroundings: &Surroundings<'_>) -> Part {
+    part(law, _) {
         Part::Jet(Box::new(Valve {
-            omega: TAU * self.frequency,
-            damping_ratio: self.damping_ratio,
+            omega: TAU * law.frequency,
+            damping_ratio: law.damping_ratio,
             opening: 0.0,
             speed: 0.0,
         }))

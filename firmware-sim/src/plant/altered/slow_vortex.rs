@@ -1,44 +1,24 @@
 //! A starting vortex with a finite roll-up time.
 
-use rand::RngExt;
-use rand_chacha::ChaCha8Rng;
+use crate::plant::base::log_uniform;
+use crate::plant::effects::StartingVortex;
+use crate::plant::effects::physics;
+use crate::plant::part::{JetPart, Part, Piece};
 
-use crate::plant::base::{BasePlant, log_uniform};
-use crate::plant::effects::{Card, Limits, Physics, StartingVortex};
-use crate::plant::part::{JetPart, Part, Piece, Place, Surroundings};
-
-/// Each rise of the jet adds gain·(e^(−t/τ) − e^(−t/τ_r)) per rise.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SlowVortex {
-    /// Strength (-).
-    pub gain: f64,
-    /// Time constant of its decay, τ (s).
-    pub decay_time: f64,
-    /// Roll-up time constant, τ_r (s).
-    pub rise_time: f64,
-}
-
-impl Physics for SlowVortex {
-    const NAME: &'static str = "slow-vortex";
-    const RESEMBLES: &'static str = StartingVortex::NAME;
-    const PLACE: Place = Place::Shedding;
-    const PARAMETERS: &'static [Card<Self>] = &[
-        Card::new("gain", "-", Limits::FINITE, |e| &mut e.gain),
-        Card::new("decay_time", "s", Limits::TIME, |e| &mut e.decay_time),
-        Card::new("rise_time", "s", Limits::TIME, |e| &mut e.rise_time),
-    ];
-
-    fn draw(_base: &BasePlant, rng: &mut ChaCha8Rng) -> Self {
-        Self {
-            gain: rng.random_range(0.6..1.2),
-            decay_time: log_uniform(rng, 0.035, 0.080),
-            rise_time: log_uniform(rng, 0.003, 0.008),
-        }
+physics! {
+    /// Each rise of the jet adds gain·(e^(−t/τ) − e^(−t/τ_r)) per rise.
+    SlowVortex = "slow-vortex" at Shedding, like StartingVortex
+    parameters(_, rng) {
+        /// Strength.
+        gain ["-", FINITE] = rng.random_range(0.6..1.2);
+        /// Time constant of its decay, τ.
+        decay_time ["s", TIME] = log_uniform(rng, 0.035, 0.080);
+        /// Roll-up time constant, τ_r.
+        rise_time ["s", TIME] = log_uniform(rng, 0.003, 0.008);
     }
-
-    fn part(&self, _surroundings: &Surroundings<'_>) -> Part {
+    part(law, _) {
         Part::Jet(Box::new(Vortex {
-            law: *self,
+            law: *law,
             decaying: 0.0,
             rising: 0.0,
         }))

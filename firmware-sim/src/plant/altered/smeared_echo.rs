@@ -1,45 +1,26 @@
 //! A delayed and smeared second arrival of the jet.
 
-use rand_chacha::ChaCha8Rng;
-
 use crate::plant::LONGEST_DELAY_S;
-use crate::plant::base::{BasePlant, log_uniform};
-use crate::plant::effects::{Card, EchoPath, Limits, Physics, signed};
-use crate::plant::part::{JetPart, Part, Piece, Place, Surroundings};
+use crate::plant::base::log_uniform;
+use crate::plant::effects::physics;
+use crate::plant::effects::{EchoPath, signed};
+use crate::plant::part::{JetPart, Part, Piece};
 use crate::waveform::{Cursor, Waveform};
 
-/// j(t) = direct(t) + gain·w, smear·ẇ = direct(t − delay) − w.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SmearedEcho {
-    /// Strength of the echo (-).
-    pub gain: f64,
-    /// Additional delay of its start (s).
-    pub echo_delay: f64,
-    /// Smearing time constant (s).
-    pub smear_time: f64,
-}
-
-impl Physics for SmearedEcho {
-    const NAME: &'static str = "smeared-echo";
-    const RESEMBLES: &'static str = EchoPath::NAME;
-    const PLACE: Place = Place::Path;
-    const PARAMETERS: &'static [Card<Self>] = &[
-        Card::new("gain", "-", Limits::FINITE, |e| &mut e.gain),
-        Card::new("echo_delay", "s", Limits::TRAVEL, |e| &mut e.echo_delay),
-        Card::new("smear_time", "s", Limits::TIME, |e| &mut e.smear_time),
-    ];
-
-    fn draw(_base: &BasePlant, rng: &mut ChaCha8Rng) -> Self {
-        Self {
-            gain: signed(rng, 0.20, 0.45),
-            echo_delay: log_uniform(rng, 0.060, 0.300),
-            smear_time: log_uniform(rng, 0.008, 0.030),
-        }
+physics! {
+    /// j(t) = direct(t) + gain·w, smear·ẇ = direct(t − delay) − w.
+    SmearedEcho = "smeared-echo" at Path, like EchoPath
+    parameters(_, rng) {
+        /// Strength of the echo.
+        gain ["-", FINITE] = signed(rng, 0.20, 0.45);
+        /// Additional delay of its start.
+        echo_delay ["s", TRAVEL] = log_uniform(rng, 0.060, 0.300);
+        /// Smearing time constant.
+        smear_time ["s", TIME] = log_uniform(rng, 0.008, 0.030);
     }
-
-    fn part(&self, _surroundings: &Surroundings<'_>) -> Part {
+    part(law, _) {
         Part::Jet(Box::new(Echo {
-            law: *self,
+            law: *law,
             direct: Waveform::at_rest(0.0, LONGEST_DELAY_S),
             cursor: Cursor::default(),
             washed: 0.0,

@@ -1,55 +1,30 @@
 //! Self-sustained attachment without a sharp threshold.
 
-use rand::RngExt;
-use rand_chacha::ChaCha8Rng;
+use crate::plant::effects::AttachmentHysteresis;
+use crate::plant::effects::physics;
+use crate::plant::part::{FlowPart, Part};
 
-use crate::plant::base::BasePlant;
-use crate::plant::effects::{AttachmentHysteresis, Card, Limits, Physics};
-use crate::plant::part::{FlowPart, Part, Place, Surroundings};
-
-/// settling·λ̇ = ½ + ½·tanh((s − centre + half·(2λ − 1))/width) − λ; gain·λ is added to the drive.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SmoothLatch {
-    /// Centre of the hysteresis (y).
-    pub centre: f64,
-    /// Half width of the hysteresis (y).
-    pub half_width: f64,
-    /// Width of the transition (y).
-    pub softness: f64,
-    /// Contribution of the closed latch to the drive (y).
-    pub gain: f64,
-    /// Time constant of the latch (s).
-    pub settling_time: f64,
-}
-
-impl Physics for SmoothLatch {
-    const NAME: &'static str = "smooth-latch";
-    const RESEMBLES: &'static str = AttachmentHysteresis::NAME;
-    const PLACE: Place = Place::Flow;
-    const PARAMETERS: &'static [Card<Self>] = &[
-        Card::new("centre", "y", Limits::FINITE, |e| &mut e.centre),
-        Card::new("half_width", "y", Limits::FINITE, |e| &mut e.half_width),
-        Card::new("softness", "y", Limits::POSITIVE, |e| &mut e.softness),
-        Card::new("gain", "y", Limits::FINITE, |e| &mut e.gain),
-        Card::new("settling_time", "s", Limits::TIME, |e| &mut e.settling_time),
-    ];
-
-    fn draw(base: &BasePlant, rng: &mut ChaCha8Rng) -> Self {
+physics! {
+    /// settling·λ̇ = ½ + ½·tanh((s − centre + half·(2λ − 1))/width) − λ; gain·λ is added to the drive.
+    SmoothLatch = "smooth-latch" at Flow, like AttachmentHysteresis
+    parameters(base, rng) {
+        /// Centre of the hysteresis.
+        centre ["y", FINITE] = 0.5 * (lower + upper);
+        /// Half width of the hysteresis.
+        half_width ["y", FINITE] = 0.5 * (upper - lower);
+        /// Width of the transition.
+        softness ["y", POSITIVE] = rng.random_range(0.04..0.08) * base.gain;
+        /// Contribution of the closed latch to the drive.
+        // The latch must release without a jet.
+        gain ["y", FINITE] = rng.random_range(0.5..0.75) * lower;
+        /// Time constant of the latch.
+        settling_time ["s", TIME] = rng.random_range(0.002..0.008);
+    }
+    where {
         let lower = rng.random_range(0.25..0.40) * base.gain;
         let upper = rng.random_range(0.55..0.75) * base.gain;
-        Self {
-            centre: 0.5 * (lower + upper),
-            half_width: 0.5 * (upper - lower),
-            softness: rng.random_range(0.04..0.08) * base.gain,
-            // The latch must release without a jet.
-            gain: rng.random_range(0.5..0.75) * lower,
-            settling_time: rng.random_range(0.002..0.008),
-        }
     }
-
-    fn part(&self, _surroundings: &Surroundings<'_>) -> Part {
-        Part::Flow(Box::new(*self))
-    }
+    part(law, _) { Part::Flow(Box::new(*law)) }
 }
 
 impl FlowPart for SmoothLatch {

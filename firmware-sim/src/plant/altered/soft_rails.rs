@@ -1,40 +1,19 @@
 //! An amplifier with soft saturation below its upper limit.
 
-use rand::RngExt;
-use rand_chacha::ChaCha8Rng;
+use crate::plant::effects::SensorSaturation;
+use crate::plant::effects::physics;
+use crate::plant::part::{Moment, Part, SensorPart};
 
-use crate::plant::base::BasePlant;
-use crate::plant::effects::{Card, Limits, Physics, SensorSaturation};
-use crate::plant::part::{Moment, Part, Place, SensorPart, Surroundings};
-
-/// Above the knee the reading is knee + room·tanh((x − knee)/room).
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SoftRails {
-    /// Start of the saturation (y).
-    pub knee: f64,
-    /// Remaining range above the knee (y).
-    pub room: f64,
-}
-
-impl Physics for SoftRails {
-    const NAME: &'static str = "soft-rails";
-    const RESEMBLES: &'static str = SensorSaturation::NAME;
-    const PLACE: Place = Place::Rails;
-    const PARAMETERS: &'static [Card<Self>] = &[
-        Card::new("knee", "y", Limits::FINITE, |e| &mut e.knee),
-        Card::new("room", "y", Limits::POSITIVE, |e| &mut e.room),
-    ];
-
-    fn draw(base: &BasePlant, rng: &mut ChaCha8Rng) -> Self {
-        Self {
-            knee: rng.random_range(0.62..0.78) * base.gain,
-            room: rng.random_range(0.04..0.10) * base.gain,
-        }
+physics! {
+    /// Above the knee the reading is knee + room·tanh((x − knee)/room).
+    SoftRails = "soft-rails" at Rails, like SensorSaturation
+    parameters(base, rng) {
+        /// Start of the saturation.
+        knee ["y", FINITE] = rng.random_range(0.62..0.78) * base.gain;
+        /// Remaining range above the knee.
+        room ["y", POSITIVE] = rng.random_range(0.04..0.10) * base.gain;
     }
-
-    fn part(&self, _surroundings: &Surroundings<'_>) -> Part {
-        Part::Sensor(Box::new(*self))
-    }
+    part(law, _) { Part::Sensor(Box::new(*law)) }
 }
 
 impl SensorPart for SoftRails {

@@ -1,39 +1,22 @@
 //! A film with two lags in series: film and substrate.
 
-use rand_chacha::ChaCha8Rng;
+use crate::plant::base::log_uniform;
+use crate::plant::effects::HotFilmLag;
+use crate::plant::effects::physics;
+use crate::plant::part::{Part, Piece, SensorPart};
 
-use crate::plant::base::{BasePlant, log_uniform};
-use crate::plant::effects::{Card, HotFilmLag, Limits, Physics};
-use crate::plant::part::{Part, Piece, Place, SensorPart, Surroundings};
-
-/// τ₁·ẋ = felt − x, τ₂·ẏ = x − y.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct TwoFilmLags {
-    /// Longer time constant (s).
-    pub first_time: f64,
-    /// Shorter time constant (s).
-    pub second_time: f64,
-}
-
-impl Physics for TwoFilmLags {
-    const NAME: &'static str = "two-film-lags";
-    const RESEMBLES: &'static str = HotFilmLag::NAME;
-    const PLACE: Place = Place::FilmLag;
-    const PARAMETERS: &'static [Card<Self>] = &[
-        Card::new("first_time", "s", Limits::TIME, |e| &mut e.first_time),
-        Card::new("second_time", "s", Limits::TIME, |e| &mut e.second_time),
-    ];
-
-    fn draw(_base: &BasePlant, rng: &mut ChaCha8Rng) -> Self {
-        Self {
-            first_time: log_uniform(rng, 0.015, 0.080),
-            second_time: log_uniform(rng, 0.004, 0.014),
-        }
+physics! {
+    /// τ₁·ẋ = felt − x, τ₂·ẏ = x − y.
+    TwoFilmLags = "two-film-lags" at FilmLag, like HotFilmLag
+    parameters(_, rng) {
+        /// Longer time constant.
+        first_time ["s", TIME] = log_uniform(rng, 0.015, 0.080);
+        /// Shorter time constant.
+        second_time ["s", TIME] = log_uniform(rng, 0.004, 0.014);
     }
-
-    fn part(&self, _surroundings: &Surroundings<'_>) -> Part {
+    part(law, _) {
         Part::Sensor(Box::new(Film {
-            law: *self,
+            law: *law,
             first: 0.0,
             second: 0.0,
         }))

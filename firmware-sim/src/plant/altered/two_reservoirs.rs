@@ -1,54 +1,30 @@
 //! A plenum fed from a tank that empties as well.
 
-use rand::RngExt;
-use rand_chacha::ChaCha8Rng;
+use crate::plant::base::log_uniform;
+use crate::plant::effects::PlenumDroop;
+use crate::plant::effects::physics;
+use crate::plant::part::{JetPart, Part, Piece};
 
-use crate::plant::base::{BasePlant, log_uniform};
-use crate::plant::effects::{Card, Limits, Physics, PlenumDroop};
-use crate::plant::part::{JetPart, Part, Piece, Place, Surroundings};
-
-/// Ṗ = (B − P)/τ_p − κ·v·P, Ḃ = (1 − B)/τ_b − ρ·(B − P)/τ_p; j = v·P, both full at the start.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct TwoReservoirs {
-    /// Time constant with which the tank fills the plenum, τ_p (s).
-    pub recovery_time: f64,
-    /// Time constant with which the supply fills the tank, τ_b (s).
-    pub tank_time: f64,
-    /// Volume of the plenum over that of the tank, ρ (-).
-    pub volume_ratio: f64,
-    /// Emptying rate of the plenum at full opening, κ (1/s).
-    pub depletion_rate: f64,
-}
-
-impl Physics for TwoReservoirs {
-    const NAME: &'static str = "two-reservoirs";
-    const RESEMBLES: &'static str = PlenumDroop::NAME;
-    const PLACE: Place = Place::Plenum;
-    const PARAMETERS: &'static [Card<Self>] = &[
-        Card::new("recovery_time", "s", Limits::TIME, |e| &mut e.recovery_time),
-        Card::new("tank_time", "s", Limits::TIME, |e| &mut e.tank_time),
-        Card::new("volume_ratio", "-", Limits::NOT_NEGATIVE, |e| {
-            &mut e.volume_ratio
-        }),
-        Card::new("depletion_rate", "1/s", Limits::NOT_NEGATIVE, |e| {
-            &mut e.depletion_rate
-        }),
-    ];
-
-    fn draw(_base: &BasePlant, rng: &mut ChaCha8Rng) -> Self {
+physics! {
+    /// Ṗ = (B − P)/τ_p − κ·v·P, Ḃ = (1 − B)/τ_b − ρ·(B − P)/τ_p; j = v·P, both full at the start.
+    TwoReservoirs = "two-reservoirs" at Plenum, like PlenumDroop
+    parameters(_, rng) {
+        /// Time constant with which the tank fills the plenum, τ_p.
+        recovery_time ["s", TIME] = recovery_time;
+        /// Time constant with which the supply fills the tank, τ_b.
+        tank_time ["s", TIME] = log_uniform(rng, 1.5, 5.0);
+        /// Volume of the plenum over that of the tank, ρ.
+        volume_ratio ["-", NOT_NEGATIVE] = rng.random_range(0.03..0.12);
+        /// Emptying rate of the plenum at full opening, κ.
+        depletion_rate ["1/s", NOT_NEGATIVE] = lost / ((1.0 - lost) * recovery_time);
+    }
+    where {
         let recovery_time = log_uniform(rng, 0.15, 0.6);
         let lost = rng.random_range(0.12..0.25);
-        Self {
-            recovery_time,
-            tank_time: log_uniform(rng, 1.5, 5.0),
-            volume_ratio: rng.random_range(0.03..0.12),
-            depletion_rate: lost / ((1.0 - lost) * recovery_time),
-        }
     }
-
-    fn part(&self, _surroundings: &Surroundings<'_>) -> Part {
+    part(law, _) {
         Part::Jet(Box::new(Supply {
-            law: *self,
+            law: *law,
             plenum: 1.0,
             tank: 1.0,
         }))

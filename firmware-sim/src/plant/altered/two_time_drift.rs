@@ -1,43 +1,22 @@
 //! Sensor drift with a fast and a slow time constant.
 
-use rand_chacha::ChaCha8Rng;
+use crate::plant::base::log_uniform;
+use crate::plant::effects::physics;
+use crate::plant::effects::{ThermalDrift, signed};
+use crate::plant::part::{Moment, Part, SensorPart};
 
-use crate::plant::base::{BasePlant, log_uniform};
-use crate::plant::effects::{Card, Limits, Physics, ThermalDrift, signed};
-use crate::plant::part::{Moment, Part, Place, SensorPart, Surroundings};
-
-/// Half the amplitude with each of two time constants.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct TwoTimeDrift {
-    /// Final offset (y).
-    pub amplitude: f64,
-    /// Time constant of the film's support (s).
-    pub fast_time: f64,
-    /// Time constant of the body (s).
-    pub slow_time: f64,
-}
-
-impl Physics for TwoTimeDrift {
-    const NAME: &'static str = "two-time-drift";
-    const RESEMBLES: &'static str = ThermalDrift::NAME;
-    const PLACE: Place = Place::Zero;
-    const PARAMETERS: &'static [Card<Self>] = &[
-        Card::new("amplitude", "y", Limits::FINITE, |e| &mut e.amplitude),
-        Card::new("fast_time", "s", Limits::TIME, |e| &mut e.fast_time),
-        Card::new("slow_time", "s", Limits::TIME, |e| &mut e.slow_time),
-    ];
-
-    fn draw(_base: &BasePlant, rng: &mut ChaCha8Rng) -> Self {
-        Self {
-            amplitude: signed(rng, 0.10, 0.25),
-            fast_time: log_uniform(rng, 0.5, 1.2),
-            slow_time: log_uniform(rng, 3.0, 9.0),
-        }
+physics! {
+    /// Half the amplitude with each of two time constants.
+    TwoTimeDrift = "two-time-drift" at Zero, like ThermalDrift
+    parameters(_, rng) {
+        /// Final offset.
+        amplitude ["y", FINITE] = signed(rng, 0.10, 0.25);
+        /// Time constant of the film's support.
+        fast_time ["s", TIME] = log_uniform(rng, 0.5, 1.2);
+        /// Time constant of the body.
+        slow_time ["s", TIME] = log_uniform(rng, 3.0, 9.0);
     }
-
-    fn part(&self, _surroundings: &Surroundings<'_>) -> Part {
-        Part::Sensor(Box::new(*self))
-    }
+    part(law, _) { Part::Sensor(Box::new(*law)) }
 }
 
 impl SensorPart for TwoTimeDrift {

@@ -1,46 +1,21 @@
 //! A separation bubble that reduces the jet's effect after long filling.
 
-use rand::RngExt;
-use rand_chacha::ChaCha8Rng;
+use super::{Port, Truth};
+use crate::plant::base::log_uniform;
+use crate::plant::effects::physics;
+use crate::plant::part::{FlowPart, Part};
 
-use super::{Hidden, Port, Truth};
-use crate::plant::base::{BasePlant, log_uniform};
-use crate::plant::effects::{Card, Limits, Physics};
-use crate::plant::part::{FlowPart, Part, Place, Surroundings};
-
-/// −square·b² in the level of the flow, time·ḃ = s − b.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct BubbleMemory {
-    /// Coefficient (1/y).
-    pub square: f64,
-    /// Time constant of filling and emptying (s).
-    pub time: f64,
-}
-
-impl Physics for BubbleMemory {
-    const NAME: &'static str = "bubble-memory";
-    const PLACE: Place = Place::Flow;
-    const PARAMETERS: &'static [Card<Self>] = &[
-        Card::new("square", "1/y", Limits::FINITE, |e| &mut e.square),
-        Card::new("time", "s", Limits::TIME, |e| &mut e.time),
-    ];
-
-    fn draw(base: &BasePlant, rng: &mut ChaCha8Rng) -> Self {
-        Self {
-            square: rng.random_range(0.30..0.80) / base.gain,
-            time: log_uniform(rng, 0.25, 1.2),
-        }
+physics! {
+    /// −square·b² in the level of the flow, time·ḃ = s − b.
+    BubbleMemory = "bubble-memory" at Flow
+    parameters(base, rng) {
+        /// Coefficient.
+        square ["1/y", FINITE] = rng.random_range(0.30..0.80) / base.gain;
+        /// Time constant of filling and emptying.
+        time ["s", TIME] = log_uniform(rng, 0.25, 1.2);
     }
-
-    fn part(&self, _surroundings: &Surroundings<'_>) -> Part {
-        Part::Flow(Box::new(*self))
-    }
-}
-
-impl Hidden for BubbleMemory {
-    fn truth(&self) -> Truth {
-        Truth::new(Port::Flow, &[&format!("memory of y ({} s)", self.time)])
-    }
+    part(law, _) { Part::Flow(Box::new(*law)) }
+    truth(law) { Truth::new(Port::Flow, &[&format!("memory of y ({} s)", law.time)]) }
 }
 
 impl FlowPart for BubbleMemory {

@@ -1,53 +1,29 @@
 //! A jet that is partly convected by the free stream.
 
-use rand::RngExt;
-use rand_chacha::ChaCha8Rng;
-
 use super::line::{LineLaw, line};
 use super::pulses::Pulses;
-use super::{Hidden, Port, Truth};
-use crate::plant::base::BasePlant;
-use crate::plant::effects::{Card, Limits, Physics};
+use super::{Port, Truth};
+use crate::plant::effects::physics;
 use crate::plant::free_stream::FreeStream;
-use crate::plant::part::{Part, Place, Surroundings};
 
-/// way·(Ū/U)^exponent in addition to the transport delay, U the measured free stream at the start of the transport.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ConvectiveLine {
-    /// Convection time at the mean free stream (s).
-    pub way: f64,
-    /// Exponent; 1 if everything moves with the stream (-).
-    pub exponent: f64,
-}
-
-impl Physics for ConvectiveLine {
-    const NAME: &'static str = "convective-line";
-    const PLACE: Place = Place::Line;
-    const PARAMETERS: &'static [Card<Self>] = &[
-        Card::new("way", "s", Limits::TRAVEL, |e| &mut e.way),
-        Card::new("exponent", "-", Limits::FINITE, |e| &mut e.exponent),
-    ];
-    const CHANNEL: Option<&'static str> = Some("u_inf");
-
-    fn draw(_base: &BasePlant, rng: &mut ChaCha8Rng) -> Self {
-        Self {
-            way: rng.random_range(0.030..0.060),
-            exponent: rng.random_range(1.0..2.5),
-        }
+physics! {
+    /// way·(Ū/U)^exponent in addition to the transport delay, U the measured free stream at the start of the transport.
+    ConvectiveLine = "convective-line" at Line {
+        const CHANNEL: Option<&'static str> = Some("u_inf");
     }
-
-    fn part(&self, surroundings: &Surroundings<'_>) -> Part {
+    parameters(_, rng) {
+        /// Convection time at the mean free stream.
+        way ["s", TRAVEL] = rng.random_range(0.030..0.060);
+        /// Exponent; 1 if everything moves with the stream.
+        exponent ["-", FINITE] = rng.random_range(1.0..2.5);
+    }
+    part(law, surroundings) {
         line(Way {
-            law: *self,
+            law: *law,
             stream: surroundings.free_stream.cloned(),
         })
     }
-}
-
-impl Hidden for ConvectiveLine {
-    fn truth(&self) -> Truth {
-        Truth::new(Port::Delay, &["u_inf"])
-    }
+    truth(_) { Truth::new(Port::Delay, &["u_inf"]) }
 }
 
 #[derive(Debug, Clone)]
@@ -67,7 +43,10 @@ impl LineLaw for Way {
 mod tests {
     use super::*;
     use crate::plant::beyond::line::bench::arrivals;
+    use crate::plant::effects::Physics;
+    use crate::plant::part::Surroundings;
     use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
 
     #[test]
     fn a_fast_stream_carries_fast() {

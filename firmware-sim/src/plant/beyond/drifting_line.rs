@@ -1,48 +1,22 @@
 //! A delay of the valve line that increases during the record.
 
-use rand::RngExt;
-use rand_chacha::ChaCha8Rng;
-
 use super::line::{LineLaw, line};
 use super::pulses::Pulses;
-use super::{Hidden, Port, Truth};
-use crate::plant::base::{BasePlant, log_uniform};
-use crate::plant::effects::{Card, Limits, Physics};
-use crate::plant::part::{Part, Place, Surroundings};
+use super::{Port, Truth};
+use crate::plant::base::log_uniform;
+use crate::plant::effects::physics;
 
-/// more·(1 − exp(−t/time)) on top of the transport delay, t the time in the record.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct DriftingLine {
-    /// Final additional delay (s).
-    pub more: f64,
-    /// Time constant of the drift (s).
-    pub time: f64,
-}
-
-impl Physics for DriftingLine {
-    const NAME: &'static str = "drifting-line";
-    const PLACE: Place = Place::Line;
-    const PARAMETERS: &'static [Card<Self>] = &[
-        Card::new("more", "s", Limits::TRAVEL, |e| &mut e.more),
-        Card::new("time", "s", Limits::TIME, |e| &mut e.time),
-    ];
-
-    fn draw(_base: &BasePlant, rng: &mut ChaCha8Rng) -> Self {
-        Self {
-            more: rng.random_range(0.012..0.030),
-            time: log_uniform(rng, 2.0, 8.0),
-        }
+physics! {
+    /// more·(1 − exp(−t/time)) on top of the transport delay, t the time in the record.
+    DriftingLine = "drifting-line" at Line
+    parameters(_, rng) {
+        /// Final additional delay.
+        more ["s", TRAVEL] = rng.random_range(0.012..0.030);
+        /// Time constant of the drift.
+        time ["s", TIME] = log_uniform(rng, 2.0, 8.0);
     }
-
-    fn part(&self, _surroundings: &Surroundings<'_>) -> Part {
-        line(*self)
-    }
-}
-
-impl Hidden for DriftingLine {
-    fn truth(&self) -> Truth {
-        Truth::new(Port::Delay, &["time in record"])
-    }
+    part(law, _) { line(*law) }
+    truth(_) { Truth::new(Port::Delay, &["time in record"]) }
 }
 
 impl LineLaw for DriftingLine {

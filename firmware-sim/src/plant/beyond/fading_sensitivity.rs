@@ -1,46 +1,21 @@
 //! Sensor fouling: sensitivity decreases with time.
 
-use rand::RngExt;
-use rand_chacha::ChaCha8Rng;
+use super::{Port, Truth};
+use crate::plant::base::log_uniform;
+use crate::plant::effects::physics;
+use crate::plant::part::{Moment, Part, SensorPart};
 
-use super::{Hidden, Port, Truth};
-use crate::plant::base::{BasePlant, log_uniform};
-use crate::plant::effects::{Card, Limits, Physics};
-use crate::plant::part::{Moment, Part, Place, SensorPart, Surroundings};
-
-/// Reading times 1 − loss·(1 − exp(−t/time)), t the time in the record.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FadingSensitivity {
-    /// Final loss (-).
-    pub loss: f64,
-    /// Time constant of the fouling (s).
-    pub time: f64,
-}
-
-impl Physics for FadingSensitivity {
-    const NAME: &'static str = "fading-sensitivity";
-    const PLACE: Place = Place::Film;
-    const PARAMETERS: &'static [Card<Self>] = &[
-        Card::new("loss", "-", Limits::FINITE, |e| &mut e.loss),
-        Card::new("time", "s", Limits::TIME, |e| &mut e.time),
-    ];
-
-    fn draw(_base: &BasePlant, rng: &mut ChaCha8Rng) -> Self {
-        Self {
-            loss: rng.random_range(0.20..0.50),
-            time: log_uniform(rng, 2.0, 8.0),
-        }
+physics! {
+    /// Reading times 1 − loss·(1 − exp(−t/time)), t the time in the record.
+    FadingSensitivity = "fading-sensitivity" at Film
+    parameters(_, rng) {
+        /// Final loss.
+        loss ["-", FINITE] = rng.random_range(0.20..0.50);
+        /// Time constant of the fouling.
+        time ["s", TIME] = log_uniform(rng, 2.0, 8.0);
     }
-
-    fn part(&self, _surroundings: &Surroundings<'_>) -> Part {
-        Part::Sensor(Box::new(*self))
-    }
-}
-
-impl Hidden for FadingSensitivity {
-    fn truth(&self) -> Truth {
-        Truth::new(Port::Sensor, &["time in record × reading"])
-    }
+    part(law, _) { Part::Sensor(Box::new(*law)) }
+    truth(_) { Truth::new(Port::Sensor, &["time in record × reading"]) }
 }
 
 impl SensorPart for FadingSensitivity {

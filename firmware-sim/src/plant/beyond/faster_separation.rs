@@ -1,52 +1,29 @@
 //! Faster separation after a long pulse.
 
-use rand::RngExt;
-use rand_chacha::ChaCha8Rng;
-
 use super::pulses::Pulses;
-use super::{Hidden, Port, Truth};
-use crate::plant::base::{BasePlant, log_uniform};
-use crate::plant::effects::{Card, Limits, Physics};
-use crate::plant::part::{FlowPart, Part, Piece, Place, Surroundings};
+use super::{Port, Truth};
+use crate::plant::base::log_uniform;
+use crate::plant::effects::physics;
+use crate::plant::part::{FlowPart, Part, Piece};
 
-/// Without a jet the rate is multiplied by 1 + gain·(1 − exp(−length/time)), with length that of the last
-/// pulse.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FasterSeparation {
-    /// Relative increase after an infinitely long pulse (-).
-    pub gain: f64,
-    /// Time constant of the pulse length (s).
-    pub time: f64,
-}
-
-impl Physics for FasterSeparation {
-    const NAME: &'static str = "faster-separation";
-    const PLACE: Place = Place::Flow;
-    const PARAMETERS: &'static [Card<Self>] = &[
-        Card::new("gain", "-", Limits::NOT_NEGATIVE, |e| &mut e.gain),
-        Card::new("time", "s", Limits::TIME, |e| &mut e.time),
-    ];
-
-    fn draw(_base: &BasePlant, rng: &mut ChaCha8Rng) -> Self {
-        Self {
-            gain: rng.random_range(0.8..2.5),
-            time: log_uniform(rng, 0.10, 0.40),
-        }
+physics! {
+    /// Without a jet the rate is multiplied by 1 + gain·(1 − exp(−length/time)), with length that of the last
+    /// pulse.
+    FasterSeparation = "faster-separation" at Flow
+    parameters(_, rng) {
+        /// Relative increase after an infinitely long pulse.
+        gain ["-", NOT_NEGATIVE] = rng.random_range(0.8..2.5);
+        /// Time constant of the pulse length.
+        time ["s", TIME] = log_uniform(rng, 0.10, 0.40);
     }
-
-    fn part(&self, _surroundings: &Surroundings<'_>) -> Part {
+    part(law, _) {
         Part::Flow(Box::new(Blown {
-            law: *self,
+            law: *law,
             time: 0.0,
             pulses: Pulses::default(),
         }))
     }
-}
-
-impl Hidden for FasterSeparation {
-    fn truth(&self) -> Truth {
-        Truth::new(Port::Flow, &["pulse length × y"])
-    }
+    truth(_) { Truth::new(Port::Flow, &["pulse length × y"]) }
 }
 
 #[derive(Debug, Clone)]

@@ -1,53 +1,30 @@
 //! Valve heating: blowing heats the valve, whose strength decreases and recovers over seconds.
 
-use rand::RngExt;
-use rand_chacha::ChaCha8Rng;
+use super::{MEMORY_PER_WINDOW, Port, Truth};
+use crate::plant::base::log_uniform;
+use crate::plant::effects::physics;
+use crate::plant::part::{JetPart, Part, Piece};
 
-use super::{Hidden, MEMORY_PER_WINDOW, Port, Truth};
-use crate::plant::base::{BasePlant, log_uniform};
-use crate::plant::effects::{Card, Limits, Physics};
-use crate::plant::part::{JetPart, Part, Piece, Place, Surroundings};
-
-/// time·ḣ = u − h; strength 1 − loss·h²/(h² + knee²).
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct HotJet {
-    /// Largest loss (-).
-    pub loss: f64,
-    /// Time constant of heating and cooling (s).
-    pub time: f64,
-    /// Heat at half of the loss; 1 is steady blowing (-).
-    pub knee: f64,
-}
-
-impl Physics for HotJet {
-    const NAME: &'static str = "hot-jet";
-    const PLACE: Place = Place::Plenum;
-    const PARAMETERS: &'static [Card<Self>] = &[
-        Card::new("loss", "-", Limits::FINITE, |e| &mut e.loss),
-        Card::new("time", "s", Limits::TIME, |e| &mut e.time),
-        Card::new("knee", "-", Limits::POSITIVE, |e| &mut e.knee),
-    ];
-
-    fn draw(_base: &BasePlant, rng: &mut ChaCha8Rng) -> Self {
-        Self {
-            loss: rng.random_range(0.35..0.65),
-            time: log_uniform(rng, 0.5, 2.0),
-            knee: rng.random_range(0.3..0.6),
-        }
+physics! {
+    /// time·ḣ = u − h; strength 1 − loss·h²/(h² + knee²).
+    HotJet = "hot-jet" at Plenum
+    parameters(_, rng) {
+        /// Largest loss.
+        loss ["-", FINITE] = rng.random_range(0.35..0.65);
+        /// Time constant of heating and cooling.
+        time ["s", TIME] = log_uniform(rng, 0.5, 2.0);
+        /// Heat at half of the loss; 1 is steady blowing.
+        knee ["-", POSITIVE] = rng.random_range(0.3..0.6);
     }
-
-    fn part(&self, _surroundings: &Surroundings<'_>) -> Part {
+    part(law, _) {
         Part::Jet(Box::new(Valve {
-            law: *self,
+            law: *law,
             heat: 0.0,
         }))
     }
-}
-
-impl Hidden for HotJet {
-    fn truth(&self) -> Truth {
-        let memory = format!("memory of u ({} s)", self.time);
-        let window = format!("blowing in the last {} s", self.time / MEMORY_PER_WINDOW);
+    truth(law) {
+        let memory = format!("memory of u ({} s)", law.time);
+        let window = format!("blowing in the last {} s", law.time / MEMORY_PER_WINDOW);
         Truth::new(Port::Jet, &[&memory, &window])
     }
 }

@@ -1,46 +1,20 @@
 //! A sensor that loses sensitivity at one time late in the record.
 
-use rand::RngExt;
-use rand_chacha::ChaCha8Rng;
+use super::{Port, Truth};
+use crate::plant::effects::physics;
+use crate::plant::part::{Moment, Part, SensorPart};
 
-use super::{Hidden, Port, Truth};
-use crate::plant::base::BasePlant;
-use crate::plant::effects::{Card, Limits, Physics};
-use crate::plant::part::{Moment, Part, Place, SensorPart, Surroundings};
-
-/// Reading times 1 − loss from `at` on.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LateSlip {
-    /// Loss (-).
-    pub loss: f64,
-    /// Time of the loss (s from the record's start).
-    pub at: f64,
-}
-
-impl Physics for LateSlip {
-    const NAME: &'static str = "late-slip";
-    const PLACE: Place = Place::Film;
-    const PARAMETERS: &'static [Card<Self>] = &[
-        Card::new("loss", "-", Limits::FINITE, |e| &mut e.loss),
-        Card::new("at", "s", Limits::TIME, |e| &mut e.at),
-    ];
-
-    fn draw(_base: &BasePlant, rng: &mut ChaCha8Rng) -> Self {
-        Self {
-            loss: rng.random_range(0.12..0.35),
-            at: rng.random_range(5.5..7.2),
-        }
+physics! {
+    /// Reading times 1 − loss from `at` on.
+    LateSlip = "late-slip" at Film
+    parameters(_, rng) {
+        /// Loss.
+        loss ["-", FINITE] = rng.random_range(0.12..0.35);
+        /// Time of the loss (s from the record's start).
+        at ["s", TIME] = rng.random_range(5.5..7.2);
     }
-
-    fn part(&self, _surroundings: &Surroundings<'_>) -> Part {
-        Part::Sensor(Box::new(*self))
-    }
-}
-
-impl Hidden for LateSlip {
-    fn truth(&self) -> Truth {
-        Truth::new(Port::Sensor, &["time in record × reading"]).above(self.at)
-    }
+    part(law, _) { Part::Sensor(Box::new(*law)) }
+    truth(law) { Truth::new(Port::Sensor, &["time in record × reading"]).above(law.at) }
 }
 
 impl SensorPart for LateSlip {

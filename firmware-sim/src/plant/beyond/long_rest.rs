@@ -1,48 +1,21 @@
 //! A jet that is weaker after a long rest.
 
-use rand::RngExt;
-use rand_chacha::ChaCha8Rng;
-
 use super::pulses::Pulses;
 use super::strength::{StrengthLaw, jet};
-use super::{Hidden, Port, Truth};
-use crate::plant::base::BasePlant;
-use crate::plant::effects::{Card, Limits, Physics};
-use crate::plant::part::{Part, Place, Surroundings};
+use super::{Port, Truth};
+use crate::plant::effects::physics;
 
-/// Strength 1 − loss for the whole pulse after a rest longer than `rest`.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LongRest {
-    /// Loss (-).
-    pub loss: f64,
-    /// Longest rest without loss (s).
-    pub rest: f64,
-}
-
-impl Physics for LongRest {
-    const NAME: &'static str = "long-rest";
-    const PLACE: Place = Place::Plenum;
-    const PARAMETERS: &'static [Card<Self>] = &[
-        Card::new("loss", "-", Limits::FINITE, |e| &mut e.loss),
-        Card::new("rest", "s", Limits::TIME, |e| &mut e.rest),
-    ];
-
-    fn draw(_base: &BasePlant, rng: &mut ChaCha8Rng) -> Self {
-        Self {
-            loss: rng.random_range(0.25..0.50),
-            rest: rng.random_range(0.22..0.36),
-        }
+physics! {
+    /// Strength 1 − loss for the whole pulse after a rest longer than `rest`.
+    LongRest = "long-rest" at Plenum
+    parameters(_, rng) {
+        /// Loss.
+        loss ["-", FINITE] = rng.random_range(0.25..0.50);
+        /// Longest rest without loss.
+        rest ["s", TIME] = rng.random_range(0.22..0.36);
     }
-
-    fn part(&self, _surroundings: &Surroundings<'_>) -> Part {
-        jet(*self)
-    }
-}
-
-impl Hidden for LongRest {
-    fn truth(&self) -> Truth {
-        Truth::new(Port::Jet, &["rest before"]).above(self.rest)
-    }
+    part(law, _) { jet(*law) }
+    truth(law) { Truth::new(Port::Jet, &["rest before"]).above(law.rest) }
 }
 
 impl StrengthLaw for LongRest {

@@ -1,50 +1,27 @@
 //! A sensor with a power-law characteristic.
 
-use rand::RngExt;
-use rand_chacha::ChaCha8Rng;
+use super::{Port, Truth};
+use crate::plant::effects::physics;
+use crate::plant::part::{Part, SensorPart};
 
-use super::{Hidden, Port, Truth};
-use crate::plant::base::BasePlant;
-use crate::plant::effects::{Card, Limits, Physics};
-use crate::plant::part::{Part, Place, SensorPart, Surroundings};
-
-/// full·(s/full)^exponent, odd in s.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PowerLaw {
-    /// The power (-).
-    pub exponent: f64,
-    /// Friction at which reading and friction are equal (y).
-    pub full: f64,
-}
-
-impl Physics for PowerLaw {
-    const NAME: &'static str = "power-law";
-    const PLACE: Place = Place::Film;
-    const PARAMETERS: &'static [Card<Self>] = &[
-        Card::new("exponent", "-", Limits::POSITIVE, |e| &mut e.exponent),
-        Card::new("full", "y", Limits::POSITIVE, |e| &mut e.full),
-    ];
-
-    fn draw(base: &BasePlant, rng: &mut ChaCha8Rng) -> Self {
-        Self {
-            exponent: if rng.random_bool(0.5) {
-                rng.random_range(0.50..0.75)
-            } else {
-                rng.random_range(1.4..2.0)
-            },
-            full: base.gain,
-        }
+physics! {
+    /// full·(s/full)^exponent, odd in s.
+    PowerLaw = "power-law" at Film
+    parameters(base, rng) {
+        /// The power.
+        exponent ["-", POSITIVE] = exponent;
+        /// Friction at which reading and friction are equal.
+        full ["y", POSITIVE] = base.gain;
     }
-
-    fn part(&self, _surroundings: &Surroundings<'_>) -> Part {
-        Part::Sensor(Box::new(*self))
+    where {
+        let exponent = if rng.random_bool(0.5) {
+            rng.random_range(0.50..0.75)
+        } else {
+            rng.random_range(1.4..2.0)
+        };
     }
-}
-
-impl Hidden for PowerLaw {
-    fn truth(&self) -> Truth {
-        Truth::new(Port::Sensor, &["reading", "y"])
-    }
+    part(law, _) { Part::Sensor(Box::new(*law)) }
+    truth(_) { Truth::new(Port::Sensor, &["reading", "y"]) }
 }
 
 impl SensorPart for PowerLaw {

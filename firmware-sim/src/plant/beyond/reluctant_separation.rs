@@ -1,51 +1,28 @@
 //! Delayed separation after a pulse.
 
-use rand::RngExt;
-use rand_chacha::ChaCha8Rng;
-
 use super::pulses::Pulses;
-use super::{Hidden, Port, Truth};
-use crate::plant::base::{BasePlant, log_uniform};
-use crate::plant::effects::{Card, Limits, Physics};
-use crate::plant::part::{FlowPart, Part, Piece, Place, Surroundings};
+use super::{Port, Truth};
+use crate::plant::base::log_uniform;
+use crate::plant::effects::physics;
+use crate::plant::part::{FlowPart, Part, Piece};
 
-/// Without a jet the rate is multiplied by 1 − reluctance·exp(−t/time), t since the jet ended.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ReluctantSeparation {
-    /// Initial relative reduction of the rate (-).
-    pub reluctance: f64,
-    /// Time constant of its recovery (s).
-    pub time: f64,
-}
-
-impl Physics for ReluctantSeparation {
-    const NAME: &'static str = "reluctant-separation";
-    const PLACE: Place = Place::Flow;
-    const PARAMETERS: &'static [Card<Self>] = &[
-        Card::new("reluctance", "-", Limits::FINITE, |e| &mut e.reluctance),
-        Card::new("time", "s", Limits::TIME, |e| &mut e.time),
-    ];
-
-    fn draw(_base: &BasePlant, rng: &mut ChaCha8Rng) -> Self {
-        Self {
-            reluctance: rng.random_range(0.5..0.95),
-            time: log_uniform(rng, 0.03, 0.12),
-        }
+physics! {
+    /// Without a jet the rate is multiplied by 1 − reluctance·exp(−t/time), t since the jet ended.
+    ReluctantSeparation = "reluctant-separation" at Flow
+    parameters(_, rng) {
+        /// Initial relative reduction of the rate.
+        reluctance ["-", FINITE] = rng.random_range(0.5..0.95);
+        /// Time constant of its recovery.
+        time ["s", TIME] = log_uniform(rng, 0.03, 0.12);
     }
-
-    fn part(&self, _surroundings: &Surroundings<'_>) -> Part {
+    part(law, _) {
         Part::Flow(Box::new(Left {
-            law: *self,
+            law: *law,
             time: 0.0,
             pulses: Pulses::default(),
         }))
     }
-}
-
-impl Hidden for ReluctantSeparation {
-    fn truth(&self) -> Truth {
-        Truth::new(Port::Flow, &["since falling edge × y"])
-    }
+    truth(_) { Truth::new(Port::Flow, &["since falling edge × y"]) }
 }
 
 #[derive(Debug, Clone)]

@@ -1,48 +1,22 @@
 //! A supply line that empties at rest and has to be refilled.
 
-use rand::RngExt;
-use rand_chacha::ChaCha8Rng;
-
 use super::line::{LineLaw, line};
 use super::pulses::Pulses;
-use super::{Hidden, Port, Truth};
-use crate::plant::base::{BasePlant, log_uniform};
-use crate::plant::effects::{Card, Limits, Physics};
-use crate::plant::part::{Part, Place, Surroundings};
+use super::{Port, Truth};
+use crate::plant::base::log_uniform;
+use crate::plant::effects::physics;
 
-/// more·(1 − exp(−rest/time)) on top of the transport delay, for the whole pulse after that rest.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct RestLine {
-    /// Additional delay after an infinitely long rest (s).
-    pub more: f64,
-    /// Time constant of emptying (s).
-    pub time: f64,
-}
-
-impl Physics for RestLine {
-    const NAME: &'static str = "rest-line";
-    const PLACE: Place = Place::Line;
-    const PARAMETERS: &'static [Card<Self>] = &[
-        Card::new("more", "s", Limits::TRAVEL, |e| &mut e.more),
-        Card::new("time", "s", Limits::TIME, |e| &mut e.time),
-    ];
-
-    fn draw(_base: &BasePlant, rng: &mut ChaCha8Rng) -> Self {
-        Self {
-            more: rng.random_range(0.012..0.030),
-            time: log_uniform(rng, 0.06, 0.25),
-        }
+physics! {
+    /// more·(1 − exp(−rest/time)) on top of the transport delay, for the whole pulse after that rest.
+    RestLine = "rest-line" at Line
+    parameters(_, rng) {
+        /// Additional delay after an infinitely long rest.
+        more ["s", TRAVEL] = rng.random_range(0.012..0.030);
+        /// Time constant of emptying.
+        time ["s", TIME] = log_uniform(rng, 0.06, 0.25);
     }
-
-    fn part(&self, _surroundings: &Surroundings<'_>) -> Part {
-        line(*self)
-    }
-}
-
-impl Hidden for RestLine {
-    fn truth(&self) -> Truth {
-        Truth::new(Port::Delay, &["rest before"])
-    }
+    part(law, _) { line(*law) }
+    truth(_) { Truth::new(Port::Delay, &["rest before"]) }
 }
 
 impl LineLaw for RestLine {

@@ -1,48 +1,22 @@
 //! A jet that is weaker after a short rest.
 
-use rand::RngExt;
-use rand_chacha::ChaCha8Rng;
-
 use super::pulses::Pulses;
 use super::strength::{StrengthLaw, jet};
-use super::{Hidden, Port, Truth};
-use crate::plant::base::{BasePlant, log_uniform};
-use crate::plant::effects::{Card, Limits, Physics};
-use crate::plant::part::{Part, Place, Surroundings};
+use super::{Port, Truth};
+use crate::plant::base::log_uniform;
+use crate::plant::effects::physics;
 
-/// Strength 1 − loss·exp(−rest/recovery), rest the pause before the pulse.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ShortRest {
-    /// Loss without any rest (-).
-    pub loss: f64,
-    /// Rest after which 63 % have recovered (s).
-    pub recovery: f64,
-}
-
-impl Physics for ShortRest {
-    const NAME: &'static str = "short-rest";
-    const PLACE: Place = Place::Plenum;
-    const PARAMETERS: &'static [Card<Self>] = &[
-        Card::new("loss", "-", Limits::FINITE, |e| &mut e.loss),
-        Card::new("recovery", "s", Limits::TIME, |e| &mut e.recovery),
-    ];
-
-    fn draw(_base: &BasePlant, rng: &mut ChaCha8Rng) -> Self {
-        Self {
-            loss: rng.random_range(0.35..0.65),
-            recovery: log_uniform(rng, 0.06, 0.20),
-        }
+physics! {
+    /// Strength 1 − loss·exp(−rest/recovery), rest the pause before the pulse.
+    ShortRest = "short-rest" at Plenum
+    parameters(_, rng) {
+        /// Loss without any rest.
+        loss ["-", FINITE] = rng.random_range(0.35..0.65);
+        /// Rest after which 63 % have recovered.
+        recovery ["s", TIME] = log_uniform(rng, 0.06, 0.20);
     }
-
-    fn part(&self, _surroundings: &Surroundings<'_>) -> Part {
-        jet(*self)
-    }
-}
-
-impl Hidden for ShortRest {
-    fn truth(&self) -> Truth {
-        Truth::new(Port::Jet, &["rest before"])
-    }
+    part(law, _) { jet(*law) }
+    truth(_) { Truth::new(Port::Jet, &["rest before"]) }
 }
 
 impl StrengthLaw for ShortRest {

@@ -1,46 +1,20 @@
 //! Saturation of the flow above a level only.
 
-use rand::RngExt;
-use rand_chacha::ChaCha8Rng;
+use super::{Port, Truth};
+use crate::plant::effects::physics;
+use crate::plant::part::{FlowPart, Part};
 
-use super::{Hidden, Port, Truth};
-use crate::plant::base::BasePlant;
-use crate::plant::effects::{Card, Limits, Physics};
-use crate::plant::part::{FlowPart, Part, Place, Surroundings};
-
-/// −slope·(s − level) in the level of the flow where s exceeds it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct StallAbove {
-    /// Strength (-).
-    pub slope: f64,
-    /// Threshold friction (y).
-    pub level: f64,
-}
-
-impl Physics for StallAbove {
-    const NAME: &'static str = "stall-above";
-    const PLACE: Place = Place::Flow;
-    const PARAMETERS: &'static [Card<Self>] = &[
-        Card::new("slope", "-", Limits::NOT_NEGATIVE, |e| &mut e.slope),
-        Card::new("level", "y", Limits::FINITE, |e| &mut e.level),
-    ];
-
-    fn draw(base: &BasePlant, rng: &mut ChaCha8Rng) -> Self {
-        Self {
-            slope: rng.random_range(0.8..3.0),
-            level: rng.random_range(0.55..0.80) * base.gain,
-        }
+physics! {
+    /// −slope·(s − level) in the level of the flow where s exceeds it.
+    StallAbove = "stall-above" at Flow
+    parameters(base, rng) {
+        /// Strength.
+        slope ["-", NOT_NEGATIVE] = rng.random_range(0.8..3.0);
+        /// Threshold friction.
+        level ["y", FINITE] = rng.random_range(0.55..0.80) * base.gain;
     }
-
-    fn part(&self, _surroundings: &Surroundings<'_>) -> Part {
-        Part::Flow(Box::new(*self))
-    }
-}
-
-impl Hidden for StallAbove {
-    fn truth(&self) -> Truth {
-        Truth::new(Port::Flow, &["y"]).above(self.level)
-    }
+    part(law, _) { Part::Flow(Box::new(*law)) }
+    truth(law) { Truth::new(Port::Flow, &["y"]).above(law.level) }
 }
 
 impl FlowPart for StallAbove {

@@ -1,56 +1,35 @@
 //! Faster separation after much blowing.
 
-use rand::RngExt;
-use rand_chacha::ChaCha8Rng;
-
 use super::pulses::Pulses;
-use super::{Hidden, MEMORY_PER_WINDOW, Port, Truth};
-use crate::plant::base::{BasePlant, log_uniform};
-use crate::plant::effects::{Card, Limits, Physics};
-use crate::plant::part::{FlowPart, Part, Piece, Place, Surroundings};
+use super::{MEMORY_PER_WINDOW, Port, Truth};
+use crate::plant::base::log_uniform;
+use crate::plant::effects::physics;
+use crate::plant::part::{FlowPart, Part, Piece};
 use crate::waveform::{Cursor, Waveform};
 
-/// Without a jet the rate is multiplied by 1 + gain·b, b the fraction of the last `window` seconds with a
-/// jet.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct StirredLayer {
-    /// Relative increase after continuous blowing (-).
-    pub gain: f64,
-    /// Window length (s).
-    pub window: f64,
-}
-
-impl Physics for StirredLayer {
-    const NAME: &'static str = "stirred-layer";
-    const PLACE: Place = Place::Flow;
-    const PARAMETERS: &'static [Card<Self>] = &[
-        Card::new("gain", "-", Limits::NOT_NEGATIVE, |e| &mut e.gain),
-        Card::new("window", "s", Limits::TIME, |e| &mut e.window),
-    ];
-
-    fn draw(_base: &BasePlant, rng: &mut ChaCha8Rng) -> Self {
-        Self {
-            gain: rng.random_range(0.8..2.5),
-            window: log_uniform(rng, 0.25, 1.0),
-        }
+physics! {
+    /// Without a jet the rate is multiplied by 1 + gain·b, b the fraction of the last `window` seconds with a
+    /// jet.
+    StirredLayer = "stirred-layer" at Flow
+    parameters(_, rng) {
+        /// Relative increase after continuous blowing.
+        gain ["-", NOT_NEGATIVE] = rng.random_range(0.8..2.5);
+        /// Window length.
+        window ["s", TIME] = log_uniform(rng, 0.25, 1.0);
     }
-
-    fn part(&self, _surroundings: &Surroundings<'_>) -> Part {
+    part(law, _) {
         Part::Flow(Box::new(Stirred {
-            law: *self,
+            law: *law,
             time: 0.0,
             blown: 0.0,
             pulses: Pulses::default(),
-            past: Waveform::at_rest(0.0, self.window),
+            past: Waveform::at_rest(0.0, law.window),
             cursor: Cursor::default(),
         }))
     }
-}
-
-impl Hidden for StirredLayer {
-    fn truth(&self) -> Truth {
-        let window = format!("blowing in the last {} s × y", self.window);
-        let memory = format!("memory of u ({} s) × y", MEMORY_PER_WINDOW * self.window);
+    truth(law) {
+        let window = format!("blowing in the last {} s × y", law.window);
+        let memory = format!("memory of u ({} s) × y", MEMORY_PER_WINDOW * law.window);
         Truth::new(Port::Flow, &[&window, &memory])
     }
 }

@@ -1,46 +1,22 @@
 //! A jet whose strength builds up within the pulse.
 
-use rand::RngExt;
-use rand_chacha::ChaCha8Rng;
-
 use super::pulses::Pulses;
 use super::strength::{StrengthLaw, jet};
-use super::{Hidden, Port, Truth};
-use crate::plant::base::{BasePlant, log_uniform};
-use crate::plant::effects::{Card, Limits, Physics};
-use crate::plant::part::{Part, Place, Surroundings};
+use super::{Port, Truth};
+use crate::plant::base::log_uniform;
+use crate::plant::effects::physics;
 
-/// Strength 1 − deficit·exp(−t/time), t since the pulse began.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SwellingJet {
-    /// Initial deficit (-).
-    pub deficit: f64,
-    /// Build-up time constant (s).
-    pub time: f64,
-}
-
-impl Physics for SwellingJet {
-    const NAME: &'static str = "swelling-jet";
-    const PLACE: Place = Place::Plenum;
-    const PARAMETERS: &'static [Card<Self>] = &[
-        Card::new("deficit", "-", Limits::FINITE, |e| &mut e.deficit),
-        Card::new("time", "s", Limits::TIME, |e| &mut e.time),
-    ];
-
-    fn draw(_base: &BasePlant, rng: &mut ChaCha8Rng) -> Self {
-        Self {
-            deficit: rng.random_range(0.30..0.60),
-            time: log_uniform(rng, 0.08, 0.35),
-        }
+physics! {
+    /// Strength 1 − deficit·exp(−t/time), t since the pulse began.
+    SwellingJet = "swelling-jet" at Plenum
+    parameters(_, rng) {
+        /// Initial deficit.
+        deficit ["-", FINITE] = rng.random_range(0.30..0.60);
+        /// Build-up time constant.
+        time ["s", TIME] = log_uniform(rng, 0.08, 0.35);
     }
-
-    fn part(&self, _surroundings: &Surroundings<'_>) -> Part {
-        jet(*self)
-    }
-}
-
-impl Hidden for SwellingJet {
-    fn truth(&self) -> Truth {
+    part(law, _) { jet(*law) }
+    truth(_) {
         // A jet exists only during the pulse, in which both coordinates are equal.
         Truth::new(Port::Jet, &["since rising edge", "pulse length"])
     }

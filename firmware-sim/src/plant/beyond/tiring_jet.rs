@@ -1,48 +1,22 @@
 //! A jet that weakens with every pulse.
 
-use rand::RngExt;
-use rand_chacha::ChaCha8Rng;
-
 use super::pulses::Pulses;
 use super::strength::{StrengthLaw, jet};
-use super::{Hidden, Port, Truth};
-use crate::plant::base::{BasePlant, log_uniform};
-use crate::plant::effects::{Card, Limits, Physics};
-use crate::plant::part::{Part, Place, Surroundings};
+use super::{Port, Truth};
+use crate::plant::base::log_uniform;
+use crate::plant::effects::physics;
 
-/// Strength 1 − loss·(1 − exp(−(n − 1)/pulses)), n the number of the pulse in the record.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct TiringJet {
-    /// Final loss (-).
-    pub loss: f64,
-    /// Number of pulses after which 63 % of the loss has occurred (-).
-    pub pulses: f64,
-}
-
-impl Physics for TiringJet {
-    const NAME: &'static str = "tiring-jet";
-    const PLACE: Place = Place::Plenum;
-    const PARAMETERS: &'static [Card<Self>] = &[
-        Card::new("loss", "-", Limits::FINITE, |e| &mut e.loss),
-        Card::new("pulses", "-", Limits::POSITIVE, |e| &mut e.pulses),
-    ];
-
-    fn draw(_base: &BasePlant, rng: &mut ChaCha8Rng) -> Self {
-        Self {
-            loss: rng.random_range(0.25..0.50),
-            pulses: log_uniform(rng, 5.0, 20.0),
-        }
+physics! {
+    /// Strength 1 − loss·(1 − exp(−(n − 1)/pulses)), n the number of the pulse in the record.
+    TiringJet = "tiring-jet" at Plenum
+    parameters(_, rng) {
+        /// Final loss.
+        loss ["-", FINITE] = rng.random_range(0.25..0.50);
+        /// Number of pulses after which 63 % of the loss has occurred.
+        pulses ["-", POSITIVE] = log_uniform(rng, 5.0, 20.0);
     }
-
-    fn part(&self, _surroundings: &Surroundings<'_>) -> Part {
-        jet(*self)
-    }
-}
-
-impl Hidden for TiringJet {
-    fn truth(&self) -> Truth {
-        Truth::new(Port::Jet, &["pulse number"])
-    }
+    part(law, _) { jet(*law) }
+    truth(_) { Truth::new(Port::Jet, &["pulse number"]) }
 }
 
 impl StrengthLaw for TiringJet {

@@ -1,46 +1,21 @@
 //! Motion of the flow reduces its attachment.
 
-use rand::RngExt;
-use rand_chacha::ChaCha8Rng;
+use super::{Port, Truth};
+use crate::plant::base::log_uniform;
+use crate::plant::effects::physics;
+use crate::plant::part::{FlowPart, Part};
 
-use super::{Hidden, Port, Truth};
-use crate::plant::base::{BasePlant, log_uniform};
-use crate::plant::effects::{Card, Limits, Physics};
-use crate::plant::part::{FlowPart, Part, Place, Surroundings};
-
-/// −loss·m in the level of the flow, time·ṁ = |ṡ| − m.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Unrest {
-    /// Strength (s).
-    pub loss: f64,
-    /// Decay time constant (s).
-    pub time: f64,
-}
-
-impl Physics for Unrest {
-    const NAME: &'static str = "unrest";
-    const PLACE: Place = Place::Flow;
-    const PARAMETERS: &'static [Card<Self>] = &[
-        Card::new("loss", "s", Limits::FINITE, |e| &mut e.loss),
-        Card::new("time", "s", Limits::TIME, |e| &mut e.time),
-    ];
-
-    fn draw(_base: &BasePlant, rng: &mut ChaCha8Rng) -> Self {
-        Self {
-            loss: rng.random_range(0.03..0.08),
-            time: log_uniform(rng, 0.10, 0.60),
-        }
+physics! {
+    /// −loss·m in the level of the flow, time·ṁ = |ṡ| − m.
+    Unrest = "unrest" at Flow
+    parameters(_, rng) {
+        /// Strength.
+        loss ["s", FINITE] = rng.random_range(0.03..0.08);
+        /// Decay time constant.
+        time ["s", TIME] = log_uniform(rng, 0.10, 0.60);
     }
-
-    fn part(&self, _surroundings: &Surroundings<'_>) -> Part {
-        Part::Flow(Box::new(*self))
-    }
-}
-
-impl Hidden for Unrest {
-    fn truth(&self) -> Truth {
-        Truth::new(Port::Flow, &[&format!("memory of rate ({} s)", self.time)])
-    }
+    part(law, _) { Part::Flow(Box::new(*law)) }
+    truth(law) { Truth::new(Port::Flow, &[&format!("memory of rate ({} s)", law.time)]) }
 }
 
 impl FlowPart for Unrest {

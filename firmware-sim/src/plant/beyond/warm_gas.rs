@@ -1,45 +1,27 @@
 //! A jet that is stronger in warm air.
 
-use rand_chacha::ChaCha8Rng;
-
-use super::{Beyond, Hidden, Port, Truth};
-use crate::plant::base::BasePlant;
-use crate::plant::effects::{Card, Limits, Physics, signed};
+use super::{Beyond, Port, Truth};
+use crate::plant::effects::physics;
+use crate::plant::effects::signed;
 use crate::plant::free_stream::{FreeStream, MEAN_TEMPERATURE};
-use crate::plant::part::{JetPart, Part, Piece, Place, Surroundings};
+use crate::plant::part::{JetPart, Part, Piece};
 
-/// Strength 1 + gain·(θ − 20 °C), θ the measured temperature of the air.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct WarmGas {
-    /// Relative change of the jet per kelvin (1/K).
-    pub gain: f64,
-}
-
-impl Physics for WarmGas {
-    const NAME: &'static str = "warm-gas";
-    const PLACE: Place = Place::FreeStream;
-    const PARAMETERS: &'static [Card<Self>] =
-        &[Card::new("gain", "1/K", Limits::FINITE, |e| &mut e.gain)];
-    const CHANNEL: Option<&'static str> = Some(Beyond::TEMPERATURE);
-
-    fn draw(_base: &BasePlant, rng: &mut ChaCha8Rng) -> Self {
-        Self {
-            gain: signed(rng, 0.04, 0.10),
-        }
+physics! {
+    /// Strength 1 + gain·(θ − 20 °C), θ the measured temperature of the air.
+    WarmGas = "warm-gas" at FreeStream {
+        const CHANNEL: Option<&'static str> = Some(Beyond::TEMPERATURE);
     }
-
-    fn part(&self, surroundings: &Surroundings<'_>) -> Part {
+    parameters(_, rng) {
+        /// Relative change of the jet per kelvin.
+        gain ["1/K", FINITE] = signed(rng, 0.04, 0.10);
+    }
+    part(law, surroundings) {
         Part::Jet(Box::new(Gas {
-            gain: self.gain,
+            gain: law.gain,
             air: surroundings.free_stream.cloned(),
         }))
     }
-}
-
-impl Hidden for WarmGas {
-    fn truth(&self) -> Truth {
-        Truth::new(Port::Jet, &[Beyond::TEMPERATURE])
-    }
+    truth(_) { Truth::new(Port::Jet, &[Beyond::TEMPERATURE]) }
 }
 
 #[derive(Debug, Clone)]
@@ -68,8 +50,11 @@ impl JetPart for Gas {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::plant::effects::Physics;
     use crate::plant::jet::bench::{jet, run};
+    use crate::plant::part::Surroundings;
     use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
 
     #[test]
     fn it_follows_the_temperature() {

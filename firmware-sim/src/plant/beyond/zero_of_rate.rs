@@ -1,49 +1,30 @@
 //! A sensor offset caused by rapid changes.
 
-use rand_chacha::ChaCha8Rng;
+use super::{Port, Truth};
+use crate::plant::base::log_uniform;
+use crate::plant::effects::physics;
+use crate::plant::effects::signed;
+use crate::plant::part::{Part, Piece, SensorPart};
 
-use super::{Hidden, Port, Truth};
-use crate::plant::base::{BasePlant, log_uniform};
-use crate::plant::effects::{Card, Limits, Physics, signed};
-use crate::plant::part::{Part, Piece, Place, SensorPart, Surroundings};
-
-/// gain·m on the reading, time·ṁ = |ṡ| − m.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ZeroOfRate {
-    /// Strength (s).
-    pub gain: f64,
-    /// Decay time constant (s).
-    pub time: f64,
-}
-
-impl Physics for ZeroOfRate {
-    const NAME: &'static str = "zero-of-rate";
-    const PLACE: Place = Place::Zero;
-    const PARAMETERS: &'static [Card<Self>] = &[
-        Card::new("gain", "s", Limits::FINITE, |e| &mut e.gain),
-        Card::new("time", "s", Limits::TIME, |e| &mut e.time),
-    ];
-
-    fn draw(_base: &BasePlant, rng: &mut ChaCha8Rng) -> Self {
-        Self {
-            gain: signed(rng, 0.02, 0.06),
-            time: log_uniform(rng, 0.10, 0.80),
-        }
+physics! {
+    /// gain·m on the reading, time·ṁ = |ṡ| − m.
+    ZeroOfRate = "zero-of-rate" at Zero
+    parameters(_, rng) {
+        /// Strength.
+        gain ["s", FINITE] = signed(rng, 0.02, 0.06);
+        /// Decay time constant.
+        time ["s", TIME] = log_uniform(rng, 0.10, 0.80);
     }
-
-    fn part(&self, _surroundings: &Surroundings<'_>) -> Part {
+    part(law, _) {
         Part::Sensor(Box::new(Shaken {
-            law: *self,
+            law: *law,
             unrest: 0.0,
         }))
     }
-}
-
-impl Hidden for ZeroOfRate {
-    fn truth(&self) -> Truth {
+    truth(law) {
         Truth::new(
             Port::Sensor,
-            &[&format!("memory of rate ({} s)", self.time)],
+            &[&format!("memory of rate ({} s)", law.time)],
         )
     }
 }

@@ -1,35 +1,16 @@
 //! Saturation by a cubic of the friction.
 
-use rand::RngExt;
-use rand_chacha::ChaCha8Rng;
+use crate::plant::effects::physics;
+use crate::plant::part::{FlowPart, Part};
 
-use super::{Card, Limits, Physics};
-use crate::plant::base::BasePlant;
-use crate::plant::part::{FlowPart, Part, Place, Surroundings};
-
-/// −γ·s³ in the drive.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct AmplitudeSaturation {
-    /// γ (1/y²).
-    pub cubic: f64,
-}
-
-impl Physics for AmplitudeSaturation {
-    const NAME: &'static str = "amplitude-saturation";
-    const PLACE: Place = Place::Flow;
-    const PARAMETERS: &'static [Card<Self>] = &[Card::new("cubic", "1/y²", Limits::FINITE, |e| {
-        &mut e.cubic
-    })];
-
-    fn draw(_base: &BasePlant, rng: &mut ChaCha8Rng) -> Self {
-        Self {
-            cubic: rng.random_range(0.2..0.8),
-        }
+physics! {
+    /// −γ·s³ in the drive.
+    AmplitudeSaturation = "amplitude-saturation" at Flow
+    parameters(_, rng) {
+        /// γ.
+        cubic ["1/y²", FINITE] = rng.random_range(0.2..0.8);
     }
-
-    fn part(&self, _surroundings: &Surroundings<'_>) -> Part {
-        Part::Flow(Box::new(*self))
-    }
+    part(law, _) { Part::Flow(Box::new(*law)) }
 }
 
 impl FlowPart for AmplitudeSaturation {

@@ -1,54 +1,29 @@
 //! Hysteresis of attachment.
 
-use rand::RngExt;
-use rand_chacha::ChaCha8Rng;
+use crate::plant::effects::physics;
+use crate::plant::part::{FlowPart, Part, Piece};
 
-use super::{Card, Limits, Physics};
-use crate::plant::base::BasePlant;
-use crate::plant::part::{FlowPart, Part, Piece, Place, Surroundings};
-
-/// A relay with two thresholds, added to the drive.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct AttachmentHysteresis {
-    /// Friction above which the flow attaches (y).
-    pub upper_threshold: f64,
-    /// Friction below which it detaches (y).
-    pub lower_threshold: f64,
-    /// Contribution of the closed relay to the drive (y).
-    pub gain: f64,
-}
-
-impl Physics for AttachmentHysteresis {
-    const NAME: &'static str = "attachment-hysteresis";
-    const PLACE: Place = Place::Flow;
-    const PARAMETERS: &'static [Card<Self>] = &[
-        Card::new("upper_threshold", "y", Limits::FINITE, |e| {
-            &mut e.upper_threshold
-        }),
-        Card::new("lower_threshold", "y", Limits::FINITE, |e| {
-            &mut e.lower_threshold
-        }),
-        Card::new("gain", "y", Limits::FINITE, |e| &mut e.gain),
-    ];
-
-    fn draw(base: &BasePlant, rng: &mut ChaCha8Rng) -> Self {
-        let lower_threshold = rng.random_range(0.25..0.40) * base.gain;
-        Self {
-            upper_threshold: rng.random_range(0.55..0.75) * base.gain,
-            lower_threshold,
-            // Without a jet the relay must release: gain below the lower threshold.
-            gain: rng.random_range(0.5..0.75) * lower_threshold,
+physics! {
+    /// A relay with two thresholds, added to the drive.
+    AttachmentHysteresis = "attachment-hysteresis" at Flow {
+        fn conflict(&self) -> Option<(&'static str, &'static str)> {
+            (self.lower_threshold >= self.upper_threshold)
+                .then_some(("lower_threshold", "below upper_threshold"))
         }
     }
-
-    fn conflict(&self) -> Option<(&'static str, &'static str)> {
-        (self.lower_threshold >= self.upper_threshold)
-            .then_some(("lower_threshold", "below upper_threshold"))
+    parameters(base, rng) {
+        /// Friction above which the flow attaches.
+        upper_threshold ["y", FINITE] = rng.random_range(0.55..0.75) * base.gain;
+        /// Friction below which it detaches.
+        lower_threshold ["y", FINITE] = lower_threshold;
+        /// Contribution of the closed relay to the drive.
+        // Without a jet the relay must release: gain below the lower threshold.
+        gain ["y", FINITE] = rng.random_range(0.5..0.75) * lower_threshold;
     }
-
-    fn part(&self, _surroundings: &Surroundings<'_>) -> Part {
+    where { let lower_threshold = rng.random_range(0.25..0.40) * base.gain; }
+    part(law, _) {
         Part::Flow(Box::new(Relay {
-            levels: *self,
+            levels: *law,
             attached: false,
         }))
     }

@@ -1,47 +1,22 @@
 //! Bouc–Wen hysteresis in the drive.
 
-use rand::RngExt;
-use rand_chacha::ChaCha8Rng;
+use crate::plant::effects::physics;
+use crate::plant::part::{FlowPart, Part};
 
-use super::{Card, Limits, Physics};
-use crate::plant::base::BasePlant;
-use crate::plant::part::{FlowPart, Part, Place, Surroundings};
-
-/// ż = A·ṡ − β·|ṡ|·z − γ·ṡ·|z|, −α·z in the drive.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct BoucWenHysteresis {
-    /// A, the initial slope of the loop (1 by convention, because only α·A is identifiable) (-).
-    pub stiffness: f64,
-    /// β, saturation rate of the loop (1/y).
-    pub beta: f64,
-    /// γ, shape of the loop (1/y).
-    pub gamma: f64,
-    /// α, weight of the loop in the drive (-).
-    pub alpha: f64,
-}
-
-impl Physics for BoucWenHysteresis {
-    const NAME: &'static str = "bouc-wen-hysteresis";
-    const PLACE: Place = Place::Flow;
-    const PARAMETERS: &'static [Card<Self>] = &[
-        Card::new("stiffness", "-", Limits::FINITE, |e| &mut e.stiffness),
-        Card::new("beta", "1/y", Limits::FINITE, |e| &mut e.beta),
-        Card::new("gamma", "1/y", Limits::FINITE, |e| &mut e.gamma),
-        Card::new("alpha", "-", Limits::FINITE, |e| &mut e.alpha),
-    ];
-
-    fn draw(_base: &BasePlant, rng: &mut ChaCha8Rng) -> Self {
-        Self {
-            stiffness: 1.0,
-            beta: rng.random_range(2.0..6.0),
-            gamma: rng.random_range(0.0..2.0),
-            alpha: rng.random_range(0.5..1.2),
-        }
+physics! {
+    /// ż = A·ṡ − β·|ṡ|·z − γ·ṡ·|z|, −α·z in the drive.
+    BoucWenHysteresis = "bouc-wen-hysteresis" at Flow
+    parameters(_, rng) {
+        /// A, the initial slope of the loop (1 by convention, because only α·A is identifiable).
+        stiffness ["-", FINITE] = 1.0;
+        /// β, saturation rate of the loop.
+        beta ["1/y", FINITE] = rng.random_range(2.0..6.0);
+        /// γ, shape of the loop.
+        gamma ["1/y", FINITE] = rng.random_range(0.0..2.0);
+        /// α, weight of the loop in the drive.
+        alpha ["-", FINITE] = rng.random_range(0.5..1.2);
     }
-
-    fn part(&self, _surroundings: &Surroundings<'_>) -> Part {
-        Part::Flow(Box::new(*self))
-    }
+    part(law, _) { Part::Flow(Box::new(*law)) }
 }
 
 impl FlowPart for BoucWenHysteresis {

@@ -1,41 +1,19 @@
 //! Dry friction with stick-slip.
 
-use rand::RngExt;
-use rand_chacha::ChaCha8Rng;
-
-use super::{Card, Limits, Physics};
 use crate::plant::SAMPLE_PERIOD_S;
-use crate::plant::base::BasePlant;
-use crate::plant::part::{FlowPart, Part, Place, Resistance, Surroundings};
+use crate::plant::effects::physics;
+use crate::plant::part::{FlowPart, Part, Resistance};
 
-/// −F·sign(ṡ) opposes every motion.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct DryFriction {
-    /// F (y per sample).
-    pub level: f64,
-}
-
-impl Physics for DryFriction {
-    const NAME: &'static str = "dry-friction";
-    const PLACE: Place = Place::Flow;
-    const PARAMETERS: &'static [Card<Self>] = &[Card::new(
-        "level",
-        "y per sample",
-        Limits::NOT_NEGATIVE,
-        |e| &mut e.level,
-    )];
-
-    fn draw(base: &BasePlant, rng: &mut ChaCha8Rng) -> Self {
-        let slow = base.attach_s.max(base.separate_s);
-        Self {
-            // Sticking range around the equilibrium of the slower motion.
-            level: rng.random_range(0.10..0.25) * SAMPLE_PERIOD_S / slow,
-        }
+physics! {
+    /// −F·sign(ṡ) opposes every motion.
+    DryFriction = "dry-friction" at Flow
+    parameters(base, rng) {
+        /// F.
+        // Sticking range around the equilibrium of the slower motion.
+        level ["y per sample", NOT_NEGATIVE] = rng.random_range(0.10..0.25) * SAMPLE_PERIOD_S / slow;
     }
-
-    fn part(&self, _surroundings: &Surroundings<'_>) -> Part {
-        Part::Flow(Box::new(*self))
-    }
+    where { let slow = base.attach_s.max(base.separate_s); }
+    part(law, _) { Part::Flow(Box::new(*law)) }
 }
 
 impl FlowPart for DryFriction {

@@ -2,42 +2,26 @@
 
 use std::collections::VecDeque;
 
-use rand_chacha::ChaCha8Rng;
-
-use super::{Card, Limits, Physics, signed};
-use crate::plant::base::{BasePlant, log_uniform};
-use crate::plant::part::{JetPart, Part, Piece, Place, Surroundings};
+use super::signed;
+use crate::plant::base::log_uniform;
+use crate::plant::effects::physics;
+use crate::plant::part::{JetPart, Part, Piece};
 use crate::plant::{LONGEST_DELAY_S, SHORTEST_PIECE_S};
 use crate::waveform::{Cursor, Waveform};
 
-/// j(t) = direct(t) + gain·direct(t − delay).
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct EchoPath {
-    /// Strength of the echo (-).
-    pub gain: f64,
-    /// Additional delay (s).
-    pub echo_delay: f64,
-}
-
-impl Physics for EchoPath {
-    const NAME: &'static str = "echo-path";
-    const PLACE: Place = Place::Path;
-    const PARAMETERS: &'static [Card<Self>] = &[
-        Card::new("gain", "-", Limits::FINITE, |e| &mut e.gain),
-        Card::new("echo_delay", "s", Limits::TRAVEL, |e| &mut e.echo_delay),
-    ];
-
-    fn draw(_base: &BasePlant, rng: &mut ChaCha8Rng) -> Self {
-        Self {
-            gain: signed(rng, 0.15, 0.45),
-            echo_delay: log_uniform(rng, 0.060, 0.350),
-        }
+physics! {
+    /// j(t) = direct(t) + gain·direct(t − delay).
+    EchoPath = "echo-path" at Path
+    parameters(_, rng) {
+        /// Strength of the echo.
+        gain ["-", FINITE] = signed(rng, 0.15, 0.45);
+        /// Additional delay.
+        echo_delay ["s", TRAVEL] = log_uniform(rng, 0.060, 0.350);
     }
-
-    fn part(&self, _surroundings: &Surroundings<'_>) -> Part {
+    part(law, _) {
         Part::Jet(Box::new(Echo {
-            gain: self.gain,
-            delay_s: self.echo_delay,
+            gain: law.gain,
+            delay_s: law.echo_delay,
             direct: Waveform::at_rest(0.0, LONGEST_DELAY_S),
             cursor: Cursor::default(),
             returning: VecDeque::new(),

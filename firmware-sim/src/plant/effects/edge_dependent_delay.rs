@@ -1,46 +1,31 @@
 //! Different delays of rising and falling edges.
 
-use rand::RngExt;
-use rand_chacha::ChaCha8Rng;
+use crate::plant::base::FlowDelay;
+use crate::plant::effects::physics;
+use crate::plant::part::Part;
 
-use super::{Card, Limits, Physics};
-use crate::plant::base::{BasePlant, FlowDelay};
-use crate::plant::part::{Part, Place, Surroundings};
-
-/// Rising and falling edges travel for different times; replaces the base plant's delay.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct EdgeDependentDelay {
-    /// Delay of a rising edge (s).
-    pub rise_delay: f64,
-    /// Delay of a falling edge (s).
-    pub fall_delay: f64,
-}
-
-impl Physics for EdgeDependentDelay {
-    const NAME: &'static str = "edge-dependent-delay";
-    const PLACE: Place = Place::Transport;
-    const PARAMETERS: &'static [Card<Self>] = &[
-        Card::new("rise_delay", "s", Limits::TRAVEL, |e| &mut e.rise_delay),
-        Card::new("fall_delay", "s", Limits::TRAVEL, |e| &mut e.fall_delay),
-    ];
-
-    fn draw(_base: &BasePlant, rng: &mut ChaCha8Rng) -> Self {
-        loop {
+physics! {
+    /// Rising and falling edges travel for different times; replaces the base plant's delay.
+    EdgeDependentDelay = "edge-dependent-delay" at Transport
+    parameters(_, rng) {
+        /// Delay of a rising edge.
+        rise_delay ["s", TRAVEL] = rise_delay;
+        /// Delay of a falling edge.
+        fall_delay ["s", TRAVEL] = fall_delay;
+    }
+    where {
+        let (rise_delay, fall_delay) = loop {
             let rise_delay: f64 = rng.random_range(0.020..0.060);
             let fall_delay: f64 = rng.random_range(0.020..0.060);
             if (rise_delay - fall_delay).abs() > 0.008 {
-                break Self {
-                    rise_delay,
-                    fall_delay,
-                };
+                break (rise_delay, fall_delay);
             }
-        }
+        };
     }
-
-    fn part(&self, _surroundings: &Surroundings<'_>) -> Part {
+    part(law, _) {
         Part::Delay(FlowDelay::EdgeDependent {
-            rise_s: self.rise_delay,
-            fall_s: self.fall_delay,
+            rise_s: law.rise_delay,
+            fall_s: law.fall_delay,
         })
     }
 }

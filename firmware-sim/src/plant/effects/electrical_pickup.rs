@@ -1,33 +1,17 @@
 //! The valve current couples into the sensor cable.
 
-use rand_chacha::ChaCha8Rng;
+use super::signed;
+use crate::plant::effects::physics;
+use crate::plant::part::{Moment, Part, SensorPart};
 
-use super::{Card, Limits, Physics, signed};
-use crate::plant::base::BasePlant;
-use crate::plant::part::{Moment, Part, Place, SensorPart, Surroundings};
-
-/// gain·u is added to the reading.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ElectricalPickup {
-    /// Reading added while the valve is energised (y).
-    pub gain: f64,
-}
-
-impl Physics for ElectricalPickup {
-    const NAME: &'static str = "electrical-pickup";
-    const PLACE: Place = Place::Cable;
-    const PARAMETERS: &'static [Card<Self>] =
-        &[Card::new("gain", "y", Limits::FINITE, |e| &mut e.gain)];
-
-    fn draw(_base: &BasePlant, rng: &mut ChaCha8Rng) -> Self {
-        Self {
-            gain: signed(rng, 0.06, 0.25),
-        }
+physics! {
+    /// gain·u is added to the reading.
+    ElectricalPickup = "electrical-pickup" at Cable
+    parameters(_, rng) {
+        /// Reading added while the valve is energised.
+        gain ["y", FINITE] = signed(rng, 0.06, 0.25);
     }
-
-    fn part(&self, _surroundings: &Surroundings<'_>) -> Part {
-        Part::Sensor(Box::new(*self))
-    }
+    part(law, _) { Part::Sensor(Box::new(*law)) }
 }
 
 impl SensorPart for ElectricalPickup {

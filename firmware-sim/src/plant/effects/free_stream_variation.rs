@@ -1,35 +1,22 @@
 //! Dependence of the jet's influence on the measured free stream.
 
-use rand_chacha::ChaCha8Rng;
-
-use super::{Card, Limits, Physics, signed};
-use crate::plant::base::BasePlant;
+use super::signed;
+use crate::plant::effects::physics;
 use crate::plant::free_stream::FreeStream;
-use crate::plant::part::{JetPart, Part, Piece, Place, Surroundings};
+use crate::plant::part::{JetPart, Part, Piece};
 
-/// The jet's strength times 1 + gain·(U/Ū − 1).
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FreeStreamVariation {
-    /// Relative change of the jet per relative change of the free stream (-).
-    pub gain: f64,
-}
-
-impl Physics for FreeStreamVariation {
-    const NAME: &'static str = "free-stream-variation";
-    const PLACE: Place = Place::FreeStream;
-    const PARAMETERS: &'static [Card<Self>] =
-        &[Card::new("gain", "-", Limits::FINITE, |e| &mut e.gain)];
-    const CHANNEL: Option<&'static str> = Some("u_inf");
-
-    fn draw(_base: &BasePlant, rng: &mut ChaCha8Rng) -> Self {
-        Self {
-            gain: signed(rng, 1.0, 3.0),
-        }
+physics! {
+    /// The jet's strength times 1 + gain·(U/Ū − 1).
+    FreeStreamVariation = "free-stream-variation" at FreeStream {
+        const CHANNEL: Option<&'static str> = Some("u_inf");
     }
-
-    fn part(&self, surroundings: &Surroundings<'_>) -> Part {
+    parameters(_, rng) {
+        /// Relative change of the jet per relative change of the free stream.
+        gain ["-", FINITE] = signed(rng, 1.0, 3.0);
+    }
+    part(law, surroundings) {
         Part::Jet(Box::new(Stream {
-            gain: self.gain,
+            gain: law.gain,
             free_stream: surroundings.free_stream.cloned(),
         }))
     }
@@ -61,9 +48,11 @@ impl JetPart for Stream {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::plant::base::BasePlant;
     use crate::plant::rig::bench::base;
     use crate::plant::{FlowDelay, PlantSpec, Rig};
     use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
 
     #[test]
     fn free_stream_changes_the_level_by_its_gain() {

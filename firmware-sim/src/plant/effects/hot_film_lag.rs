@@ -1,35 +1,19 @@
 //! First-order lag of the film.
 
-use rand_chacha::ChaCha8Rng;
+use crate::plant::base::log_uniform;
+use crate::plant::effects::physics;
+use crate::plant::part::{Part, Piece, SensorPart};
 
-use super::{Card, Limits, Physics};
-use crate::plant::base::{BasePlant, log_uniform};
-use crate::plant::part::{Part, Piece, Place, SensorPart, Surroundings};
-
-/// τ·ẏ = x − y.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct HotFilmLag {
-    /// Time constant (s).
-    pub time_constant: f64,
-}
-
-impl Physics for HotFilmLag {
-    const NAME: &'static str = "hot-film-lag";
-    const PLACE: Place = Place::FilmLag;
-    const PARAMETERS: &'static [Card<Self>] =
-        &[Card::new("time_constant", "s", Limits::TIME, |e| {
-            &mut e.time_constant
-        })];
-
-    fn draw(_base: &BasePlant, rng: &mut ChaCha8Rng) -> Self {
-        Self {
-            time_constant: log_uniform(rng, 0.010, 0.100),
-        }
+physics! {
+    /// τ·ẏ = x − y.
+    HotFilmLag = "hot-film-lag" at FilmLag
+    parameters(_, rng) {
+        /// Time constant.
+        time_constant ["s", TIME] = log_uniform(rng, 0.010, 0.100);
     }
-
-    fn part(&self, _surroundings: &Surroundings<'_>) -> Part {
+    part(law, _) {
         Part::Sensor(Box::new(Lag {
-            time_constant: self.time_constant,
+            time_constant: law.time_constant,
             film: 0.0,
         }))
     }

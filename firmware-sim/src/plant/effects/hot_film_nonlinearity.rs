@@ -1,49 +1,19 @@
 //! King's law of the hot film.
 
-use rand_chacha::ChaCha8Rng;
+use crate::plant::base::log_uniform;
+use crate::plant::effects::physics;
+use crate::plant::part::{Part, SensorPart};
 
-use super::{Card, Limits, Physics};
-use crate::plant::base::{BasePlant, log_uniform};
-use crate::plant::part::{Part, Place, SensorPart, Surroundings};
-
-/// Bridge voltage E = √(1 + κ·(s + s0)^⅓), normalised to keep 0 and 1.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct HotFilmNonlinearity {
-    /// κ, forced against natural convection (-).
-    pub king_ratio: f64,
-    /// Friction at which the convection would vanish, s0 (y).
-    pub king_offset: f64,
-}
-
-impl Physics for HotFilmNonlinearity {
-    const NAME: &'static str = "hot-film-nonlinearity";
-    const PLACE: Place = Place::Film;
-    const PARAMETERS: &'static [Card<Self>] = &[
-        Card::new(
-            "king_ratio",
-            "-",
-            Limits::new(
-                f64::MIN_POSITIVE,
-                f64::MAX,
-                "above 0 (at 0 the film does not respond to the flow)",
-            ),
-            |e| &mut e.king_ratio,
-        ),
-        Card::new("king_offset", "y", Limits::NOT_NEGATIVE, |e| {
-            &mut e.king_offset
-        }),
-    ];
-
-    fn draw(_base: &BasePlant, rng: &mut ChaCha8Rng) -> Self {
-        Self {
-            king_ratio: log_uniform(rng, 0.4, 4.0),
-            king_offset: log_uniform(rng, 0.02, 0.2),
-        }
+physics! {
+    /// Bridge voltage E = √(1 + κ·(s + s0)^⅓), normalised to keep 0 and 1.
+    HotFilmNonlinearity = "hot-film-nonlinearity" at Film
+    parameters(_, rng) {
+        /// κ, forced against natural convection.
+        king_ratio ["-", KING_RATIO] = log_uniform(rng, 0.4, 4.0);
+        /// Friction at which the convection would vanish, s0.
+        king_offset ["y", NOT_NEGATIVE] = log_uniform(rng, 0.02, 0.2);
     }
-
-    fn part(&self, _surroundings: &Surroundings<'_>) -> Part {
-        Part::Sensor(Box::new(*self))
-    }
+    part(law, _) { Part::Sensor(Box::new(*law)) }
 }
 
 impl HotFilmNonlinearity {

@@ -1,7 +1,7 @@
 //! The physical effects of a plant: one file each, with name, parameters, units, limits, usual values and
 //! continuous-time physics.
 //!
-//! A new effect is such a file, its `mod` and one line in `catalogue!`.
+//! A new effect is such a file with `physics!`, its `mod` and one line in `catalogue!`.
 
 mod amplitude_saturation;
 mod attachment_hysteresis;
@@ -95,6 +95,13 @@ impl Limits {
     pub(crate) const POSITIVE: Self = Self::new(f64::MIN_POSITIVE, f64::MAX, "above 0");
     pub(crate) const TIME: Self = Self::new(1e-4, 100.0, "between 0.0001 and 100 s");
     pub(crate) const TRAVEL: Self = Self::new(1e-4, 1.0, "between 0.0001 and 1 s");
+    pub(crate) const SAMPLES: Self = Self::new(0.0, 500.0, "between 0 and 500 samples");
+    pub(crate) const FREQUENCY: Self = Self::new(0.01, 1000.0, "between 0.01 and 1000 Hz");
+    pub(crate) const KING_RATIO: Self = Self::new(
+        f64::MIN_POSITIVE,
+        f64::MAX,
+        "above 0 (at 0 the film does not respond to the flow)",
+    );
 
     pub(crate) const fn new(low: f64, high: f64, requirement: &'static str) -> Self {
         Self {
@@ -178,13 +185,94 @@ pub(crate) trait Physics: Copy + Debug + PartialEq + Sized + 'static {
 
     /// The effect in its initial state.
     fn part(&self, surroundings: &Surroundings<'_>) -> Part;
-
-    /// The same in constant surroundings.
-    #[cfg(test)]
-    fn at_rest(&self) -> Part {
-        self.part(&Surroundings::default())
-    }
 }
+
+/// One effect: the structure with its parameters, and [`Physics`] for it.
+///
+/// ```text
+/// physics! {
+///     /// The equation.
+///     Structure = "name" at Place, like Resembled { other items of Physics }
+///     parameters(base, rng) {
+///         /// Meaning, without unit.
+///         parameter ["unit", LIMITS] = a drawn value;
+///     }
+///     where { statements before the values, if values depend on each other }
+///     part(law, surroundings) { the effect in its initial state }
+///     truth(law) { what `discover` has to find, for physics outside the catalogue }
+/// }
+/// ```
+macro_rules! physics {
+    (
+        $(#[$doc:meta])*
+        $effect:ident = $name:literal at $place:ident $(, like $like:ident)? $({ $($more:tt)* })?
+        parameters($base:pat_param, $rng:pat_param) { $(
+            $(#[$meaning:meta])*
+            $parameter:ident [$unit:literal, $limits:ident] = $value:expr;
+        )* }
+        $(where { $($before:tt)* })?
+        part($law:pat_param, $surroundings:pat_param) { $($part:tt)* }
+        $(truth($hidden:pat_param) { $($truth:tt)* })?
+    ) => {
+        $(#[$doc])*
+        #[derive(Debug, Clone, Copy, PartialEq)]
+        pub struct $effect { $(
+            $(#[$meaning])*
+            #[doc = concat!("(", $unit, ")")]
+            pub $parameter: f64,
+        )* }
+
+        impl $crate::plant::effects::Physics for $effect {
+            const NAME: &'static str = $name;
+            $(const RESEMBLES: &'static str = <$like as $crate::plant::effects::Physics>::NAME;)?
+            const PLACE: $crate::plant::part::Place = $crate::plant::part::Place::$place;
+            const PARAMETERS: &'static [$crate::plant::effects::Card<Self>] =
+                &[$($crate::plant::effects::Card::new(
+                    stringify!($parameter),
+                    $unit,
+                    $crate::plant::effects::Limits::$limits,
+                    |effect| &mut effect.$parameter,
+                ),)*];
+            $($($more)*)?
+
+            fn draw(
+                $base: &$crate::plant::base::BasePlant,
+                $rng: &mut rand_chacha::ChaCha8Rng,
+            ) -> Self {
+                #[allow(unused_imports, reason = "parameters may be drawn by functions")]
+                use rand::RngExt as _;
+                $($($before)*)?
+                Self { $($parameter: $value),* }
+            }
+
+            fn part(
+                &self,
+                $surroundings: &$crate::plant::part::Surroundings<'_>,
+            ) -> $crate::plant::part::Part {
+                let $law = self;
+                $($part)*
+            }
+        }
+
+        #[cfg(test)]
+        impl $effect {
+            /// The effect in its initial state and in constant surroundings.
+            #[allow(dead_code, reason = "some are tested by means of a whole rig")]
+            pub(crate) fn at_rest(&self) -> $crate::plant::part::Part {
+                let surroundings = $crate::plant::part::Surroundings::default();
+                $crate::plant::effects::Physics::part(self, &surroundings)
+            }
+        }
+
+        $(impl $crate::plant::beyond::Hidden for $effect {
+            fn truth(&self) -> $crate::plant::beyond::Truth {
+                let $hidden = self;
+                $($truth)*
+            }
+        })?
+    };
+}
+pub(super) use physics;
 
 pub(super) fn parameters<E: Physics>(effect: &E) -> Vec<Parameter> {
     let each = E::PARAMETERS.iter().map(|card| Parameter {

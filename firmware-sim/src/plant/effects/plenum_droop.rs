@@ -1,44 +1,26 @@
 //! Pressure drop of the plenum during blowing.
 
-use rand::RngExt;
-use rand_chacha::ChaCha8Rng;
+use crate::plant::base::log_uniform;
+use crate::plant::effects::physics;
+use crate::plant::part::{JetPart, Part, Piece};
 
-use super::{Card, Limits, Physics};
-use crate::plant::base::{BasePlant, log_uniform};
-use crate::plant::part::{JetPart, Part, Piece, Place, Surroundings};
-
-/// Ṗ = (1 − P)/τ_r − κ·v·P, j = v·P, P = 1 at the start.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PlenumDroop {
-    /// Refill time constant τ_r (s).
-    pub recovery_time: f64,
-    /// Emptying rate κ at full opening (1/s).
-    pub depletion_rate: f64,
-}
-
-impl Physics for PlenumDroop {
-    const NAME: &'static str = "plenum-droop";
-    const PLACE: Place = Place::Plenum;
-    const PARAMETERS: &'static [Card<Self>] = &[
-        Card::new("recovery_time", "s", Limits::TIME, |e| &mut e.recovery_time),
-        Card::new("depletion_rate", "1/s", Limits::NOT_NEGATIVE, |e| {
-            &mut e.depletion_rate
-        }),
-    ];
-
-    fn draw(_base: &BasePlant, rng: &mut ChaCha8Rng) -> Self {
+physics! {
+    /// Ṗ = (1 − P)/τ_r − κ·v·P, j = v·P, P = 1 at the start.
+    PlenumDroop = "plenum-droop" at Plenum
+    parameters(_, rng) {
+        /// Refill time constant τ_r.
+        recovery_time ["s", TIME] = recovery_time;
+        /// Emptying rate κ at full opening.
+        depletion_rate ["1/s", NOT_NEGATIVE] = lost / ((1.0 - lost) * recovery_time);
+    }
+    where {
         let recovery_time = log_uniform(rng, 0.3, 2.5);
         // Pressure lost under steady blowing.
         let lost = rng.random_range(0.15..0.40);
-        Self {
-            recovery_time,
-            depletion_rate: lost / ((1.0 - lost) * recovery_time),
-        }
     }
-
-    fn part(&self, _surroundings: &Surroundings<'_>) -> Part {
+    part(law, _) {
         Part::Jet(Box::new(Plenum {
-            droop: *self,
+            droop: *law,
             pressure: 1.0,
         }))
     }

@@ -1,41 +1,20 @@
 //! Quadratic resistance against fast changes.
 
-use rand::RngExt;
-use rand_chacha::ChaCha8Rng;
-
-use super::{Card, Limits, Physics};
 use crate::plant::SAMPLE_PERIOD_S;
-use crate::plant::base::BasePlant;
-use crate::plant::part::{FlowPart, Part, Place, Resistance, Surroundings};
+use crate::plant::effects::physics;
+use crate::plant::part::{FlowPart, Part, Resistance};
 
-/// −d·Δs·|Δs| with Δs the change per sample.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct QuadraticDrag {
-    /// d (samples/y).
-    pub coefficient: f64,
-}
-
-impl Physics for QuadraticDrag {
-    const NAME: &'static str = "quadratic-drag";
-    const PLACE: Place = Place::Flow;
-    const PARAMETERS: &'static [Card<Self>] = &[Card::new(
-        "coefficient",
-        "samples/y",
-        Limits::NOT_NEGATIVE,
-        |e| &mut e.coefficient,
-    )];
-
-    fn draw(base: &BasePlant, rng: &mut ChaCha8Rng) -> Self {
-        let fast = base.attach_s.min(base.separate_s);
-        Self {
-            // Resistance against the fastest motion, relative to the flow's own.
-            coefficient: rng.random_range(0.5..1.5) * fast / SAMPLE_PERIOD_S,
-        }
+physics! {
+    /// −d·Δs·|Δs| with Δs the change per sample.
+    QuadraticDrag = "quadratic-drag" at Flow
+    parameters(base, rng) {
+        /// d.
+        // Resistance against the fastest motion, relative to the flow's own.
+        coefficient ["samples/y", NOT_NEGATIVE] =
+            rng.random_range(0.5..1.5) * fast / SAMPLE_PERIOD_S;
     }
-
-    fn part(&self, _surroundings: &Surroundings<'_>) -> Part {
-        Part::Flow(Box::new(*self))
-    }
+    where { let fast = base.attach_s.min(base.separate_s); }
+    part(law, _) { Part::Flow(Box::new(*law)) }
 }
 
 impl FlowPart for QuadraticDrag {

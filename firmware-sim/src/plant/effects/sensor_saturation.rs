@@ -1,43 +1,22 @@
 //! Saturation of the sensor.
 
-use rand::RngExt;
-use rand_chacha::ChaCha8Rng;
+use crate::plant::effects::physics;
+use crate::plant::part::{Moment, Part, SensorPart};
 
-use super::{Card, Limits, Physics};
-use crate::plant::base::BasePlant;
-use crate::plant::part::{Moment, Part, Place, SensorPart, Surroundings};
-
-/// The reading is limited at both ends.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SensorSaturation {
-    /// Lower limit (y).
-    pub lower_limit: f64,
-    /// Upper limit (y).
-    pub upper_limit: f64,
-}
-
-impl Physics for SensorSaturation {
-    const NAME: &'static str = "sensor-saturation";
-    const PLACE: Place = Place::Rails;
-    const PARAMETERS: &'static [Card<Self>] = &[
-        Card::new("lower_limit", "y", Limits::FINITE, |e| &mut e.lower_limit),
-        Card::new("upper_limit", "y", Limits::FINITE, |e| &mut e.upper_limit),
-    ];
-
-    fn draw(base: &BasePlant, rng: &mut ChaCha8Rng) -> Self {
-        Self {
-            lower_limit: rng.random_range(0.04..0.12),
-            upper_limit: rng.random_range(0.65..0.85) * base.gain,
+physics! {
+    /// The reading is limited at both ends.
+    SensorSaturation = "sensor-saturation" at Rails {
+        fn conflict(&self) -> Option<(&'static str, &'static str)> {
+            (self.lower_limit >= self.upper_limit).then_some(("lower_limit", "below upper_limit"))
         }
     }
-
-    fn conflict(&self) -> Option<(&'static str, &'static str)> {
-        (self.lower_limit >= self.upper_limit).then_some(("lower_limit", "below upper_limit"))
+    parameters(base, rng) {
+        /// Lower limit.
+        lower_limit ["y", FINITE] = rng.random_range(0.04..0.12);
+        /// Upper limit.
+        upper_limit ["y", FINITE] = rng.random_range(0.65..0.85) * base.gain;
     }
-
-    fn part(&self, _surroundings: &Surroundings<'_>) -> Part {
-        Part::Sensor(Box::new(*self))
-    }
+    part(law, _) { Part::Sensor(Box::new(*law)) }
 }
 
 impl SensorPart for SensorSaturation {

@@ -1,40 +1,20 @@
 //! A vortex after switching on, added to the jet.
 
-use rand::RngExt;
-use rand_chacha::ChaCha8Rng;
-
 use super::vortex::Vortex;
-use super::{Card, Limits, Physics};
-use crate::plant::base::{BasePlant, log_uniform};
-use crate::plant::part::{Part, Place, Surroundings};
+use crate::plant::base::log_uniform;
+use crate::plant::effects::physics;
+use crate::plant::part::Part;
 
-/// ẇ = −w/τ + max(dj/dt, 0); the flow receives j + gain·w.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct StartingVortex {
-    /// Strength (-).
-    pub gain: f64,
-    /// Time constant of its decay (s).
-    pub decay_time: f64,
-}
-
-impl Physics for StartingVortex {
-    const NAME: &'static str = "starting-vortex";
-    const PLACE: Place = Place::Shedding;
-    const PARAMETERS: &'static [Card<Self>] = &[
-        Card::new("gain", "-", Limits::FINITE, |e| &mut e.gain),
-        Card::new("decay_time", "s", Limits::TIME, |e| &mut e.decay_time),
-    ];
-
-    fn draw(_base: &BasePlant, rng: &mut ChaCha8Rng) -> Self {
-        Self {
-            gain: rng.random_range(0.4..1.0),
-            decay_time: log_uniform(rng, 0.020, 0.080),
-        }
+physics! {
+    /// ẇ = −w/τ + max(dj/dt, 0); the flow receives j + gain·w.
+    StartingVortex = "starting-vortex" at Shedding
+    parameters(_, rng) {
+        /// Strength.
+        gain ["-", FINITE] = rng.random_range(0.4..1.0);
+        /// Time constant of its decay.
+        decay_time ["s", TIME] = log_uniform(rng, 0.020, 0.080);
     }
-
-    fn part(&self, _surroundings: &Surroundings<'_>) -> Part {
-        Part::Jet(Box::new(Vortex::starting(self.gain, self.decay_time)))
-    }
+    part(law, _) { Part::Jet(Box::new(Vortex::starting(law.gain, law.decay_time))) }
 }
 
 #[cfg(test)]

@@ -1,38 +1,20 @@
 //! Sensor drift while the film's support warms up.
 
-use rand_chacha::ChaCha8Rng;
+use super::signed;
+use crate::plant::base::log_uniform;
+use crate::plant::effects::physics;
+use crate::plant::part::{Moment, Part, SensorPart};
 
-use super::{Card, Limits, Physics, signed};
-use crate::plant::base::{BasePlant, log_uniform};
-use crate::plant::part::{Moment, Part, Place, SensorPart, Surroundings};
-
-/// amplitude·(1 − e^(−t/τ)) is added to the reading.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ThermalDrift {
-    /// Final offset (y).
-    pub amplitude: f64,
-    /// Time constant of the drift (s).
-    pub time_constant: f64,
-}
-
-impl Physics for ThermalDrift {
-    const NAME: &'static str = "thermal-drift";
-    const PLACE: Place = Place::Zero;
-    const PARAMETERS: &'static [Card<Self>] = &[
-        Card::new("amplitude", "y", Limits::FINITE, |e| &mut e.amplitude),
-        Card::new("time_constant", "s", Limits::TIME, |e| &mut e.time_constant),
-    ];
-
-    fn draw(_base: &BasePlant, rng: &mut ChaCha8Rng) -> Self {
-        Self {
-            amplitude: signed(rng, 0.08, 0.25),
-            time_constant: log_uniform(rng, 1.0, 6.0),
-        }
+physics! {
+    /// amplitude·(1 − e^(−t/τ)) is added to the reading.
+    ThermalDrift = "thermal-drift" at Zero
+    parameters(_, rng) {
+        /// Final offset.
+        amplitude ["y", FINITE] = signed(rng, 0.08, 0.25);
+        /// Time constant of the drift.
+        time_constant ["s", TIME] = log_uniform(rng, 1.0, 6.0);
     }
-
-    fn part(&self, _surroundings: &Surroundings<'_>) -> Part {
-        Part::Sensor(Box::new(*self))
-    }
+    part(law, _) { Part::Sensor(Box::new(*law)) }
 }
 
 impl SensorPart for ThermalDrift {

@@ -1,38 +1,21 @@
 //! First-order valve.
 
-use rand_chacha::ChaCha8Rng;
+use crate::plant::base::log_uniform;
+use crate::plant::effects::physics;
+use crate::plant::part::{JetPart, Part, Piece};
 
-use super::{Card, Limits, Physics};
-use crate::plant::base::{BasePlant, log_uniform};
-use crate::plant::part::{JetPart, Part, Piece, Place, Surroundings};
-
-/// v̇ = (u − v)/τ with one τ while opening, another while closing.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ValveLag {
-    /// Time constant while opening (s).
-    pub opening_time: f64,
-    /// Time constant while closing (s).
-    pub closing_time: f64,
-}
-
-impl Physics for ValveLag {
-    const NAME: &'static str = "valve-lag";
-    const PLACE: Place = Place::Valve;
-    const PARAMETERS: &'static [Card<Self>] = &[
-        Card::new("opening_time", "s", Limits::TIME, |e| &mut e.opening_time),
-        Card::new("closing_time", "s", Limits::TIME, |e| &mut e.closing_time),
-    ];
-
-    fn draw(_base: &BasePlant, rng: &mut ChaCha8Rng) -> Self {
-        Self {
-            opening_time: log_uniform(rng, 0.005, 0.025),
-            closing_time: log_uniform(rng, 0.008, 0.050),
-        }
+physics! {
+    /// v̇ = (u − v)/τ with one τ while opening, another while closing.
+    ValveLag = "valve-lag" at Valve
+    parameters(_, rng) {
+        /// Time constant while opening.
+        opening_time ["s", TIME] = log_uniform(rng, 0.005, 0.025);
+        /// Time constant while closing.
+        closing_time ["s", TIME] = log_uniform(rng, 0.008, 0.050);
     }
-
-    fn part(&self, _surroundings: &Surroundings<'_>) -> Part {
+    part(law, _) {
         Part::Jet(Box::new(Valve {
-            lag: *self,
+            lag: *law,
             opening: 0.0,
         }))
     }

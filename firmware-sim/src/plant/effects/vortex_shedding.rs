@@ -2,53 +2,26 @@
 
 use std::f64::consts::TAU;
 
-use rand::RngExt;
-use rand_chacha::ChaCha8Rng;
+use crate::plant::base::log_uniform;
+use crate::plant::effects::physics;
+use crate::plant::part::{FlowPart, Part, Piece};
 
-use super::{Card, Limits, Physics};
-use crate::plant::base::{BasePlant, log_uniform};
-use crate::plant::part::{FlowPart, Part, Piece, Place, Surroundings};
-
-/// q̈ = ω²·(j − q) − 2ζω·q̇; the film measures s + gain·(q − j).
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct VortexShedding {
-    /// Undamped natural frequency (Hz).
-    pub frequency: f64,
-    /// ζ, below 1 for an oscillation (-).
-    pub damping_ratio: f64,
-    /// Amplitude of the oscillation (y).
-    pub gain: f64,
-}
-
-impl Physics for VortexShedding {
-    const NAME: &'static str = "vortex-shedding";
-    const PLACE: Place = Place::Flow;
-    const PARAMETERS: &'static [Card<Self>] = &[
-        Card::new(
-            "frequency",
-            "Hz",
-            Limits::new(0.01, 1000.0, "between 0.01 and 1000 Hz"),
-            |e| &mut e.frequency,
-        ),
-        Card::new("damping_ratio", "-", Limits::NOT_NEGATIVE, |e| {
-            &mut e.damping_ratio
-        }),
-        Card::new("gain", "y", Limits::FINITE, |e| &mut e.gain),
-    ];
-
-    fn draw(_base: &BasePlant, rng: &mut ChaCha8Rng) -> Self {
-        Self {
-            frequency: log_uniform(rng, 5.0, 30.0),
-            damping_ratio: rng.random_range(0.06..0.25),
-            gain: rng.random_range(0.12..0.30),
-        }
+physics! {
+    /// q̈ = ω²·(j − q) − 2ζω·q̇; the film measures s + gain·(q − j).
+    VortexShedding = "vortex-shedding" at Flow
+    parameters(_, rng) {
+        /// Undamped natural frequency.
+        frequency ["Hz", FREQUENCY] = log_uniform(rng, 5.0, 30.0);
+        /// ζ, below 1 for an oscillation.
+        damping_ratio ["-", NOT_NEGATIVE] = rng.random_range(0.06..0.25);
+        /// Amplitude of the oscillation.
+        gain ["y", FINITE] = rng.random_range(0.12..0.30);
     }
-
-    fn part(&self, _surroundings: &Surroundings<'_>) -> Part {
+    part(law, _) {
         Part::Flow(Box::new(Ringing {
-            omega: TAU * self.frequency,
-            damping_ratio: self.damping_ratio,
-            gain: self.gain,
+            omega: TAU * law.frequency,
+            damping_ratio: law.damping_ratio,
+            gain: law.gain,
             q: 0.0,
             q_dot: 0.0,
         }))

@@ -547,10 +547,12 @@ mod tests {
             "slow-wake",
             "level-rate",
             "dry-friction",
+            "reading-curve",
+            "hot-film-lag",
             "zero-offset",
         ];
         let mut model = Model::default();
-        for name in [3, 5, 1, 4, 0, 2].map(|i: usize| order[i]) {
+        for name in [6, 3, 7, 5, 1, 4, 0, 2].map(|i: usize| order[i]) {
             let spec = model.spec(name).expect("known");
             let values: Vec<f64> = spec.parameters.iter().map(|p| p.starts[0]).collect();
             model.add(spec, &values, None);

@@ -570,6 +570,26 @@ mod tests {
         assert!(fitted.standard_error(1).is_some_and(|error| error < 1e-4));
     }
 
+    /// A steep curve hides a state that grows far beyond it while the jets are on: y and its derivatives stay finite.
+    #[test]
+    fn derivatives_behind_a_saturated_curve_are_finite() {
+        let u = (0..900).map(|k| f64::from(u8::from(k < 600))).collect();
+        let mut model = Model {
+            a: vec![0.99],
+            b: vec![0.02],
+            c: vec![0.0195],
+            delay: Delay::Fixed { delays: vec![1] },
+            ..Model::default()
+        };
+        let spec = model.spec("reading-curve").expect("a base term");
+        model.add(spec, &[0.5, 0.4], None);
+        let record = Record::new("grows", Use::Identify, 0.001, u, vec![0.8; 900]);
+        let all: Vec<usize> = (0..model.coordinates().len()).collect();
+        let (run, columns) = sensitivities(&model, &record, &all).expect("bounded");
+        assert!((run[600] - 0.8).abs() < 0.01);
+        assert!(columns.iter().flatten().all(|slope| slope.is_finite()));
+    }
+
     /// A limit that no reading reaches is not identifiable; all other parameters are.
     #[test]
     fn an_unknown_coordinate_takes_no_other_interval_with_it() {

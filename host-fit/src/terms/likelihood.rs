@@ -80,7 +80,7 @@ impl<'a> Likelihood<'a> {
 }
 
 /// ln of the evidence of `records` for a fitted model, nats, by Laplace's approximation: the likelihood times
-/// the share of the prior volume that the data leave. `None` if the free run diverges. Coordinates that act
+/// the share of the prior volume that the data leave. `None` if the free run or a derivative of it diverges. Coordinates that act
 /// in steps have no derivative and no penalty.
 ///
 /// ln Z = ℓ(θ̂) + ½ gᵀH⁻¹g − ½ ‖θ̂ − μ‖²_Λ + ½ ln|Λ| − ½ ln|H| with H = JᵀΣ⁻¹J + Λ and g = JᵀΣ⁻¹r − Λ(θ̂ −
@@ -115,7 +115,8 @@ pub(super) fn evidence(judge: &Judge, model: &Model, records: &[Weighed]) -> Opt
     let eigenvalues = symmetric_eigenvalues(&information, n)?;
     let occam: f64 = eigenvalues.iter().map(|e| e.max(1.0).ln()).sum();
     let off: f64 = priors.iter().map(|prior| prior.off * prior.off).sum();
-    Some(normal.log_likelihood + 0.5 * (to_the_top - off - occam))
+    let evidence = normal.log_likelihood + 0.5 * (to_the_top - off - occam);
+    evidence.is_finite().then_some(evidence)
 }
 
 /// Normal equations of `model` over these records for the coordinates with the indices `free`.

@@ -18,11 +18,15 @@ pub struct ReadingCurve<T> {
     natural: T,
 }
 
+/// Above this, tanh(x/2) rounds to 1 in double precision, and its slope to 0.
+const LEVEL: f64 = 40.0;
+
 /// tanh(x/2).
 #[inline(always)]
 fn tanh_of_half<T: Real>(x: T) -> T {
     let two = T::ONE + T::ONE;
-    T::ONE - two / (x.exp() + T::ONE)
+    // The slope of the exponential overflows before its quotient vanishes.
+    T::ONE - two / (x.at_most(T::from_f64(LEVEL)).exp() + T::ONE)
 }
 
 impl<T: Real> Effect<T> for ReadingCurve<T> {

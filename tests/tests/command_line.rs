@@ -563,7 +563,7 @@ fn stress_warns_and_refuses_nothing() {
     let said = String::from_utf8_lossy(&output.stdout);
     assert_eq!(output.status.code(), Some(0), "{said}");
     for part in [
-        "warning: outside what is consistent with the records",
+        "warning: on plants that are not consistent with the records",
         "LOST",
         "Robustness margin",
         "only the model was tried",

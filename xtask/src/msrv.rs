@@ -32,7 +32,7 @@ pub(crate) fn msrv() -> Result<()> {
         let install = ["toolchain", "install", version, "--profile", "minimal"];
         run(command("rustup", &install).arg("--no-self-update"))?;
     } else {
-        println!("with the compiler that is there: there is no rustup to get Rust {version} with");
+        println!("rustup is missing, so the installed compiler is used in place of Rust {version}");
     }
     // Build products of another compiler cannot be shared.
     for (folder, packages, products) in [

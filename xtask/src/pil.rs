@@ -59,7 +59,7 @@ pub(crate) fn pil(arguments: &[String]) -> Result<Outcome> {
     }
     if model.is_some() && periods.is_some() {
         bail!(
-            "--periods is of the bundled models, and --model has a period of its own: choose one"
+            "--periods applies to the bundled models only, and a --model file states its period: give one of the two"
         );
     }
     let constants = constants(model.as_deref(), periods)?;

@@ -79,7 +79,7 @@ fn install(packages: &[&str]) -> Result<()> {
     }
     if !exists("apt-get") {
         bail!(
-            "missing {}; install by this system's own means",
+            "{} missing; install with the package manager of this system",
             packages.join(", ")
         );
     }

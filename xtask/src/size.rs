@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 
 pub(crate) const TASK: Task = Task {
     name: "size",
-    does: "what takes the flash, by crate and by symbol: --board nucleo-f446re|qemu-mps2, --model FILE",
+    does: "use of the flash by crate and by symbol: --board nucleo-f446re|qemu-mps2, --model FILE",
     run: size,
 };
 
@@ -37,7 +37,7 @@ fn size(arguments: &[String]) -> Result<()> {
     crates.insert("(constants without a name)", flash.saturating_sub(named));
     let mut crates: Vec<_> = crates.into_iter().collect();
     crates.sort_by_key(|(_, size)| std::cmp::Reverse(*size));
-    println!("\nby crate; what was inlined counts where it ended up");
+    println!("\nby crate; inlined code counts for the calling crate");
     for (name, size) in crates {
         println!(
             "{size:7} {:5.1} %  {name}",

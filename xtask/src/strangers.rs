@@ -16,7 +16,7 @@ const HEAD: &str = "\
 
 Written by `cargo xtask strangers --page`. The sets are described in
 [tests/data/strangers](../tests/data/strangers/README.md). FIT in percent, on the validation records; \"(own)\" on the
-estimation records, where no record is for validation. FOPDT and SOPDT: first and second order with dead time, fitted in
+estimation records, if there is no validation record. FOPDT and SOPDT: first and second order with dead time, fitted in
 free run. ARX: ARX(2,2). *edges* is the mean delay that `delay` measures, in samples.
 
 ";
@@ -32,7 +32,7 @@ right if all of these hold:
 - no effect is named that the plant does not have, and another input that drives y is named;
 - the interval of the dead time contains the true one;
 - the FIT of the model is at most one point below that of the best baseline;
-- every printed error is that of the written file.
+- every printed error equals the error of the written file.
 
 Shares with 95 % bounds.
 

@@ -153,7 +153,7 @@ fn faults(workspaces: &[Vec<Package>], rules: &Rules) -> Vec<String> {
         if versions.len() > 1 && !skipped {
             let versions: Vec<&str> = versions.iter().copied().collect();
             faults.push(format!(
-                "{name}: in versions {}; see why, and say so in deny.toml",
+                "{name}: the versions {} are used; find the reason and state it in deny.toml",
                 versions.join(", ")
             ));
         }
@@ -163,7 +163,7 @@ fn faults(workspaces: &[Vec<Package>], rules: &Rules) -> Vec<String> {
         if own.all(|(_, versions)| versions.len() < 2) {
             let name = &skip.name;
             faults.push(format!(
-                "{name}: there are no two versions any more; take it out of deny.toml"
+                "{name}: only one version is used; remove the exception from deny.toml"
             ));
         }
     }

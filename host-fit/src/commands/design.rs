@@ -120,12 +120,12 @@ fn valve_time(text: &str) -> Result<TimeSpan, String> {
         let count = count.trim().parse();
         return count
             .map(TimeSpan::Samples)
-            .map_err(|_| format!("`{text}` is no count of samples: `2samples`"));
+            .map_err(|_| format!("`{text}` is not a whole number of samples; write it as `2samples`"));
     }
     match text.parse() {
         Ok(TimeSpan::Seconds(seconds)) => Ok(TimeSpan::Seconds(seconds)),
         _ => Err(format!(
-            "`{text}` is no time: give seconds (`0.02`, `20ms`) or samples (`2samples`)"
+            "`{text}` is not a time; give seconds (`0.02`, `20ms`) or samples (`2samples`)"
         )),
     }
 }

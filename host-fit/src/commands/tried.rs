@@ -110,7 +110,7 @@ impl Tried {
         let beyond = self.proof.lost_beyond_the_records();
         if !beyond.is_empty() {
             text.push_str(&format!(
-                "\nwarning: outside what is consistent with the records, attachment is lost with {}",
+                "\nwarning: on plants that are not consistent with the records, attachment is lost with {}",
                 few(&beyond)
             ));
         }

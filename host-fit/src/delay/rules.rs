@@ -23,7 +23,7 @@ rules! {
     noise_allowed: f64 = 1.5, "times the standard deviation", "judgement: the noise may be coloured";
     /// With a slow disturbance, one plant describes the records if the dead times of single edges scatter by no more
     /// than this factor times their standard errors.
-    scatter_allowed: f64 = 2.0, "times the standard error", "0.5 and 0.7 for a drifting temperature, 3.2 and 3.5 on data/hidden-ramp and data/paper-like, whose delay depends on y";
+    scatter_allowed: f64 = 2.0, "times the standard error", "0.5 and 0.7 on two records of a drifting temperature; 3.2 and 3.5 on data/hidden-ramp and data/paper-like, whose delay depends on y";
     /// An edge needs this many samples on either side to be located by itself; with fewer, the time constants
     /// of all edges are used.
     fewest_reach: usize = 12, "samples", "judgement: twice the fewest samples on either side of an arrival";
@@ -43,7 +43,7 @@ rules! {
     coarse_shapes: usize = 9, "", "every other response";
     /// Largest autocorrelation of neighbouring residuals by which a variance is corrected; a higher one means that
     /// the motion before the response is not modelled, and that whole records are prewhitened.
-    most_correlation: f64 = 0.82, "", "multiplies a variance by at most 10; tested in `onset.rs`";
+    most_correlation: f64 = 0.82, "", "corresponds to a variance 10 times as large; tested in `onset.rs`";
 
     /// The earliest peak of the likelihood of at least this height, relative to the highest, is the start of the
     /// response.
@@ -78,7 +78,7 @@ rules! {
     /// Fewest measured edges in each direction for the tests.
     tested_each: usize = 3, "edges", "judgement";
     /// Permutations per test.
-    shuffles: usize = 1999, "", "convention: p is known to 0.002 at 0.01";
+    shuffles: usize = 1999, "", "convention: a p-value of 0.01 then has a standard error of 0.002";
     /// Significance level of the tests.
     significant: f64 = 0.01, "p-value", "convention; the false-alarm rate is tested in `dependence.rs`";
     /// A change of the delay by less than this is irrelevant for a model.
@@ -91,7 +91,7 @@ rules! {
 
     /// Largest autocorrelation of neighbouring residuals by which a variance is corrected in a fit to whole
     /// records.
-    slowest_disturbance: f64 = 0.98, "", "multiplies a variance by at most 99: a disturbance over 50 samples";
+    slowest_disturbance: f64 = 0.98, "", "corresponds to a variance 99 times as large: a disturbance that lasts 50 samples";
     /// Least standard error of a delay: loggers and simulations differ by up to a sample in the simultaneity of u
     /// and y.
     clock: f64 = 0.5, "samples", "judgement: an interval of at least ± 1 sample; tested in `dead_time.rs` on tests/data/strangers";

@@ -71,8 +71,7 @@ pub enum DesignError {
     },
     /// No pulse train stays bounded in the long run.
     #[error(
-        "the model diverges under every pulse train with a higher mean than steady blowing (largest pole modulus {off:.5} closed, {on:.5} open): these are instabilities of the model, not of the flow; \
-         identify again with fewer lags or `--objective free-run`"
+        "the model diverges under every pulse train with a higher mean than steady blowing (largest pole modulus {off:.5} with the valve closed, {on:.5} with it open); these trains excite instabilities of the model, not of the flow; identify again with fewer lags or `--objective free-run`"
     )]
     OnlyInstabilities {
         /// Largest pole modulus with the valve closed.

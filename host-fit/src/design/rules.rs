@@ -15,7 +15,7 @@ rules! {
     settled: f64 = 1e-4, "share of the mean", "judgement";
     /// Longest time allowed for settling.
     longest_wait: usize = 60_000, "samples", "judgement";
-    /// Smaller means are replaced by this when a change is taken relative to them.
+    /// A relative change is taken with respect to the mean, or to this value if the mean is smaller.
     least_mean: f64 = 0.1, "y", "judgement: friction gains are of order one";
     /// A natural friction below this is a remainder of the initial transient and counts as 0.
     no_natural: f64 = 1e-4, "share of the friction under steady blowing", "equal to `settled`";
@@ -118,7 +118,7 @@ rules! {
     /// Rays in each plane of two errors, a multiple of four.
     margin_rays: u32 = 12, "", "judgement: limits the time";
     /// Bisections along each ray.
-    margin_bisections: u32 = 5, "", "to 4 % of a factor of 4 either way";
+    margin_bisections: u32 = 5, "", "locates an end between factors of 1/4 and 4 to 4 %";
 
     /// Transient of a pulse train that is not scored in the first comparison.
     train_from: usize = 3000, "samples", "judgement";
@@ -133,7 +133,7 @@ rules! {
     /// A range that exceeds the scored one by more than half of itself, or by more than this, is another
     /// motion.
     same_range: f64 = 0.25, "y", "judgement";
-    /// The value of an optimum is that on a flow slower or faster by one in so many samples.
+    /// The value of an optimum is the lowest on flows that are slower and faster by the inverse of this.
     detuned: u32 = 50, "samples", "judgement: a resonance sharper than 2 % does not survive on a rig";
     /// Longest period of a pulse train.
     longest_period: usize = 3000, "samples", "six times the longest lag of an identification";

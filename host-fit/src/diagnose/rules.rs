@@ -9,7 +9,7 @@ rules! {
 
     /// If the error of a model is within this factor of a known noise level, the model is adequate. A further
     /// effect is then a surrogate.
-    floor_margin: f64 = 1.03, "times the noise level", "`y_sd` of 20 repeats, pooled over the validation records, gives the noise to 0.4 %; the error of models with the right structure is 0.98 to 1.02 of it";
+    floor_margin: f64 = 1.03, "times the noise level", "20 repeats, pooled over the validation records, give the noise level to 0.4 %; models with the right structure have errors of 0.98 to 1.02 × the noise level";
     /// Level of the tests.
     level: f64 = 0.05, "p-value", "convention";
     /// Family-wise level: the e-value must be at least the inverse of this.

@@ -6,7 +6,7 @@ rules! {
     /// When a term outside the catalogue is reported, and how its curve is drawn.
     pub struct Rules in "discover";
 
-    /// Most points of a curve; equal times are spent between neighbouring points.
+    /// Most points of a curve. The coordinate spends equal times between neighbouring points.
     points: usize = 8, "", "judgement: limits the derivatives per run";
     /// A coordinate with fewer distinct points than this is not screened.
     fewest_points: usize = 3, "", "judgement: a curve needs more than the two points of a line";
@@ -32,17 +32,16 @@ rules! {
     finished: usize = 4, "", "judgement";
     /// Candidates for which the flow's lags are searched again, in addition to the best of each place and each
     /// base.
-    settled: usize = 2, "", "judgement: each takes as long as `identify`";
+    settled: usize = 2, "", "judgement: each of these searches takes as long as `identify`";
     /// Rounds in which the coordinate of the best candidate of a place is chosen again with its lags.
     rounds: usize = 2, "", "judgement: the second round never found anything new";
     /// A candidate takes part in those rounds if its error is within this factor of the best.
     in_reach: f64 = 1.5, "times the best error", "judgement: after its lags were searched, a hot jet improved \
          from 1.5 to 1.05 × the noise level";
     /// The best candidate of a place is also compared as a formula if its error is within this factor of the best.
-    contends: f64 = 1.5, "times the best error", "with a quadratic term the curve had 1.066 × the noise level, \
-         and a curve at a wrong place 1.025";
+    contends: f64 = 1.5, "times the best error", "the curve of a true quadratic term had 1.066 × the noise level, a curve at a wrong place 1.025";
     /// A model within this factor of the noise level gets no further term.
-    at_the_floor: f64 = 1.02, "times the noise level", "a wrong sensor term had 1.09 × the noise level, the true jet term 1.05 as a curve";
+    at_the_floor: f64 = 1.02, "times the noise level", "the curve of a true jet term had 1.05 × the noise level, that of a wrong sensor term 1.09";
     /// Curves at one place whose errors differ by less than this are the same curve.
     twins: f64 = 0.001, "share of the rms error", "equal coordinates differ by rounding only";
     /// A term must lower the validation error of the best base without it by this fraction.
@@ -52,7 +51,7 @@ rules! {
     /// A base model below this factor is near the noise level. A term must then explain the share `most_of_it`. A
     /// sensitivity, or a dependence on the time in the record, is then not reported, because record-to-record
     /// scatter and drift look like them.
-    near_the_floor: f64 = 1.10, "times the noise level", "cases without a term in nine families stay below it";
+    near_the_floor: f64 = 1.10, "times the noise level", "in nine families, base models of rigs without a missing term stay below this";
     /// Share of the unexplained variance that a term must explain near the noise level, and wherever the
     /// sensor has a record-to-record offset.
     most_of_it: f64 = 0.75, "share of the model error above the noise", "curves that imitate an offset drift explained 50 to 70 %, true terms at least 80 % in 16 of 17 cases";
@@ -72,7 +71,7 @@ rules! {
     /// Most knots of a trace per record.
     knots: usize = 100, "", "judgement: limits the time";
     /// Weight of the size against the curvature in the prior of a trace.
-    smallness: f64 = 0.01, "", "judgement: the bend over ten knots has the same weight as the size";
+    smallness: f64 = 0.01, "", "judgement: the curvature over ten knots has the same weight as the size";
     /// A place is reported if its posterior probability is at least this.
     likely: f64 = 0.9, "probability", "convention";
     /// Longest extension of a delay.

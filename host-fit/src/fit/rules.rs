@@ -27,10 +27,10 @@ rules! {
     leap: f64 = 2.0, "ln", "judgement: a factor of 7";
     /// Number of blocks of a record over which standard errors are summed. The block length with the larger error
     /// counts, because noise may vary slowly.
-    batches: [usize; 2] = [40, 10], "", "with 40 blocks alone, 94 of 126 intervals of 95 % contained the truth";
+    batches: [usize; 2] = [40, 10], "", "with 40 blocks alone, 94 of 126 intervals of 95 % contained the true value";
     /// Standard errors are at least those of the jackknife over records, because unmodelled disturbances may last
     /// as long as a record. If there are fewer records than this, pieces of records are used.
-    left_out: usize = 5, "records", "13 rigs of seed 313131: 22 of 24 intervals contain the truth, 18 without the jackknife";
+    left_out: usize = 5, "records", "13 rigs of seed 313131: 22 of 24 intervals contain the true value, without the jackknife 18";
 
     /// Starting points that are fitted in full, in addition to the best with each response to jets of part
     /// strength.
@@ -60,10 +60,10 @@ rules! {
     /// The scatter of the level between repeats is estimated from at least this many records.
     records_of_scatter: usize = 3, "records", "judgement: with fewer records the variation is not measurable";
     /// The scatter of the level is modelled if it is at least this share of the noise.
-    share_of_scatter: f64 = 0.05, "share of the variance", "judgement: negligible below";
+    share_of_scatter: f64 = 0.05, "share of the variance", "judgement: a smaller scatter is negligible";
     /// The scatter of the level must vary between records by this much. Noise that grows with the level in the same
     /// way in all records does not.
-    scatter_differs: f64 = 0.12, "share of its mean", "20 repeats: 0.3; 10 000 samples of noise with 40 ms: 0.03";
+    scatter_differs: f64 = 0.12, "share of its mean", "scatter of a level in 20 repeats: 0.3; coloured noise (40 ms) in 10 000 samples: 0.03";
     /// The remaining noise is at least this share of the variance.
     noise_beside_scatter: f64 = 0.1, "share of the variance", "judgement: a standard error from 20 repeats is \
          uncertain by 16 %";
@@ -74,7 +74,7 @@ rules! {
     as_good: f64 = 1.02, "times the rms error", "judgement";
 
     /// Number of runs that a record of a drifting plant is divided into.
-    pieces: usize = 20, "", "judgement; EMPS in docs/hidden-effects.md";
+    pieces: usize = 20, "", "judgement; the ball screw EMPS in docs/history/diagnosis.md";
     /// A piece is at least this multiple of the longest lag or delay. One part in this many precedes scoring.
     memories: usize = 8, "", "judgement";
     /// A plant counts as drifting if more than this share of an initial disturbance remains after a whole

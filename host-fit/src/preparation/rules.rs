@@ -9,19 +9,19 @@ rules! {
 
     /// Most samples to which the first-order reference is fitted; longer records are averaged over neighbours.
     reference_samples: usize = 20_000, "samples", "judgement: limits the time";
-    /// Its shortest time constant.
+    /// Shortest time constant of the first-order reference.
     shortest_time: f64 = 0.5, "samples", "faster responses are not distinguishable from an immediate one";
-    /// Rounds in which its dead time and time constant are refined.
+    /// Rounds in which dead time and time constant of the first-order reference are refined.
     refinements: usize = 7, "", "halving: to a hundredth of the first step";
     /// If the reference explains less than this share, y counts as independent of u.
     related: f64 = 0.2, "share of the variance", "judgement";
 
     /// y responds to the command of its own row if that response is at least this share of the gain.
-    own_row: f64 = 0.25, "share of the gain", "judgement: that of time constants up to 3.5 samples, for which one row matters";
+    own_row: f64 = 0.25, "share of the gain", "judgement: reached with time constants up to 3.5 samples, for which a shift of one row matters";
 
     /// A record rests until its first edge plus this share of the dead time. An earlier response belongs to an edge
     /// before the record.
-    surely_before: f64 = 0.6, "dead times", "state-dependent delays differ by less on the bundled flows";
+    surely_before: f64 = 0.6, "dead times", "on the bundled flows, state-dependent delays vary by less";
     /// A channel that keeps each value for at least this many samples on average counts as switched. A record rests
     /// at most until the channel switches.
     switched: usize = 20, "samples", "judgement: measured quantities change at almost every sample";
@@ -40,17 +40,14 @@ rules! {
     early: f64 = 2.5, "dead times", "later parts of the two responses are alike";
     /// … it begins with an edge if the response to it leaves less than this share of the residual of a relaxation
     /// to rest.
-    answer: f64 = 0.95, "share of the sum of squares", "judgement: both have as many parameters, but the dead \
-         time of one of two is given";
+    answer: f64 = 0.95, "share of the sum of squares", "judgement: both responses have equally many parameters, but the dead time of one of them is given";
     /// In mid-run, free runs follow the measurement for twice the dead time, at most for this share of a record …
     most_followed: usize = 4, "times shorter than the record", "judgement";
     /// … and until slow components have decayed, if that takes at most this share.
-    followed_share: usize = 10, "times shorter than the record", "following the measurement for the dead time only leaves \
-         1.11 × the noise of a true model, if the initial state of a slow wake is unknown";
+    followed_share: usize = 10, "times shorter than the record", "if the initial state of a slow wake is unknown, following for the dead time alone leaves the true model at 1.11 × the noise level";
 
     /// If the largest graded command lies between this and 1, commands are fractions of a full jet of 1.
-    share_of_full: f64 = 0.5, "u", "graded commands with random levels rarely contain the full one; a supply \
-         in volts is rarely below 1";
+    share_of_full: f64 = 0.5, "u", "graded commands with random levels rarely reach the full jet; a supply voltage is rarely below 1 V";
     /// Graded commands that are further from 0 than this have an operating point.
     operating_point: f64 = 0.25, "times their range", "judgement";
 
@@ -71,8 +68,7 @@ rules! {
     /// This share of either limit suffices if the rest levels follow the order of the records …
     creeping_share: f64 = 0.5, "", "judgement: the smallest drift of an offset in 30 sets was 2.6 standard errors";
     /// … with this p-value.
-    creeping_zero: f64 = 0.005, "p-value", "in all of 30 sets with a linear drift p was below 0.0013, in eight \
-         of them at less than four standard errors; in all of 45 sets without a drift p was above 0.0066";
+    creeping_zero: f64 = 0.005, "p-value", "30 sets with a linear drift had p below 0.0013, eight of them with drifts below four standard errors; 45 sets without a drift had p above 0.0066";
     /// If no record rests, an estimated offset closer to 0 than this is 0.
     near_zero: f64 = 0.1, "size of the response", "judgement: a first-order response determines the level of a \
          bilinear flow to a tenth";

@@ -24,7 +24,7 @@ rules! {
     turns: usize = 5, "", "convention of cross-validation";
     /// A coordinate's share must be this many standard errors above 0: about ten coordinates are tested in
     /// three ways each.
-    share_standard_errors: f64 = 2.5, "standard errors", "chosen for ten coordinates in three ways; tested in `pure_noise_explains_nothing`";
+    share_standard_errors: f64 = 2.5, "standard errors", "limits false alarms over thirty tests; tested in `pure_noise_explains_nothing`";
     /// The same for folds over whole records, lower because a single event per record has no reproducible
     /// mean.
     record_standard_errors: f64 = 1.0, "standard errors", "judgement";
@@ -66,7 +66,7 @@ rules! {
     band_standard_errors: f64 = 3.0, "standard errors", "convention; tested in `pure_noise_explains_nothing`";
 
     /// Level of the test for a trend from edge to edge.
-    trend_level: f64 = 0.002, "p-value", "1 % over a handful of tests";
+    trend_level: f64 = 0.002, "p-value", "1 % over about five tests";
     /// Weaker correlations are not reported.
     trend_weakest: f64 = 0.5, "correlation", "judgement: a quarter of the variance";
     /// Fewest edges of a trend.

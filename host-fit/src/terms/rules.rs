@@ -48,7 +48,7 @@ rules! {
     /// Most refitted proposals without effects that are of one kind.
     of_one_kind: usize = 2, "", "judgement: the fit can move the lags";
     /// Number of proposals that are refitted in full, of those fitted for a few iterations.
-    finished: usize = 4, "", "the same rigs";
+    finished: usize = 4, "", "80 rigs of six families";
     /// A given structure with more terms than this is not used as a starting point.
     most_given: usize = 6, "terms", "judgement: each of them is tested for removal at the end";
     /// Effects that are tried in place of another term.
@@ -56,21 +56,19 @@ rules! {
     /// Such a replacement is tried if its predicted error is below this factor.
     promising: f64 = 2.0, "times the error", "eight rigs: the error after a brief fit was at least 0.7 × the predicted one";
     /// A replacement is refitted in full if its error after a few iterations is within this factor of the model's.
-    in_reach: f64 = 1.2, "times the error", "judgement: a valve lag instead of a film lag is at 1.15 after the \
-         first iterations";
+    in_reach: f64 = 1.2, "times the error", "judgement: a valve lag in place of a film lag has 1.15 times the error after the first iterations";
     /// A base model replaces a second named effect if its penalised error is larger by at most this.
     as_well: f64 = 0.01, "share of the rms error", "with a fixed delay a film lag and a second lag of the flow are the same model, and the second has one parameter more";
     /// Iterations of the brief fit of each proposal.
-    brief: usize = 6, "iterations", "thresholds do not move in fewer iterations";
-    /// If there are more starting points than this, only the best ones, this many, are continued after half of the
-    /// iterations.
+    brief: usize = 6, "iterations", "with fewer iterations, thresholds stay at their starting values";
+    /// Number of starting points, the best ones, that are continued after half of the iterations.
     followed: usize = 3, "starts", "judgement: limits the time";
     /// A term is needed if removing it costs more than this factor of its penalty after a brief fit.
     far_from_needless: f64 = 5.0, "times the price", "judgement: further iterations recover at most half of the loss";
     /// Level of the tests.
     level: f64 = 0.05, "p-value", "convention";
-    /// Least number of additional parameters that were offered to the base model that effects must beat, in
-    /// multiples of the effects' parameters.
+    /// The base model that effects must beat was offered at least this many additional parameters for each parameter of
+    /// the effects.
     head_start: usize = 2, "parameters", "a memory has three parameters, an effect one to four";
     /// Longest lag that is tried.
     longest_lag_s: f64 = 0.5, "s at 1 kHz", "the paper's lags";
@@ -86,15 +84,15 @@ rules! {
     /// Most evaluations of the mesh adaptive direct search for the delays of a chosen structure.
     settling: usize = 300, "", "judgement: each evaluation is a brief fit; a structure with five delays needs 60 to 150";
     /// Iterations of the parameter fit at each evaluation of that search.
-    settling_iterations: usize = 2, "iterations", "judgement: the start is the best fit so far";
+    settling_iterations: usize = 2, "iterations", "judgement: each fit starts from the best parameters so far";
     /// How far a lag may move in that search.
     settling_reach: f64 = 0.25, "share of the lag", "judgement: larger moves are made by the search over terms";
     /// Smallest allowed move of a lag in that search.
     settling_least: usize = 8, "samples", "the step of the grid on which lags are screened";
     /// Initial frame size of that search.
-    settling_frame: f64 = 0.25, "share of each variable's range", "judgement: the start is near";
+    settling_frame: f64 = 0.25, "share of each variable's range", "judgement: the starting point is near the optimum";
     /// A delay law whose delay varies by less than this over the levels of the records is a constant delay.
-    least_rise: f64 = 1.0, "samples", "rounding to whole samples hides it";
+    least_rise: f64 = 1.0, "samples", "rounding to whole samples hides a smaller variation";
     /// A delay law counts as a constant delay if a test at this level does not distinguish them. In the same way
     /// longer lags count as a first or second order.
     law_level: f64 = 0.01, "p-value", "convention: 1 % of constant delays get a law";
@@ -114,7 +112,7 @@ rules! {
     /// Lags that are screened below the regular grid.
     short_lags: [usize; 6] = [3, 5, 8, 12, 16, 20], "samples", "a grid";
     /// First lag of the regular grid.
-    regular_lags: u16 = 26, "samples", "the next value of that grid";
+    regular_lags: u16 = 26, "samples", "continues the grid of the short lags";
     /// Time constants of a second lag of the flow that are screened.
     second_lags: [f64; 5] = [1.5, 4.0, 10.0, 20.0, 40.0], "samples", "a grid in steps of 2 to 3";
     /// Time constants of a slow wake that are screened.

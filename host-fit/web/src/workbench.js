@@ -82,7 +82,7 @@ function drawData(s) {
   place("data").replaceChildren(
     el("p", {}, `${data.records.length} records at ${significant(1000 * data.period, 3)} ms`),
     validation(s, data),
-    ...(data.remarks.length ? [el("p", {}, "What the commands can tell:"), el("ul", {}, ...data.remarks.map((r) => el("li", {}, r)))] : [el("p", {}, "The commands can tell a model of this kind.")]),
+    ...(data.remarks.length ? [el("p", {}, "Excitation of the commands:"), el("ul", {}, ...data.remarks.map((r) => el("li", {}, r)))] : [el("p", {}, "The commands excite the plant enough for a model of this kind.")]),
   );
 }
 
@@ -93,7 +93,7 @@ function validation(s, data) {
     await ask("/api/ask", { validate: boxes.filter((box) => box.checked).map((box) => box.value).join("\n") });
     await refresh();
   }), { id: "choose" });
-  const note = el("span", { class: "muted" }, s.models.length ? "The models move into the folder earlier-1: their error was quoted on other records." : "");
+  const note = el("span", { class: "muted" }, s.models.length ? "The models move into the folder earlier-1: their validation errors are of other records." : "");
   const chosen = el("p", { hidden: true }, choose, " ", note);
   const changed = () => (chosen.hidden = boxes.every((box, i) => box.checked === (data.records[i].use === "validate")));
   return el("fieldset", { class: "records" }, el("legend", {}, "validation records"),
@@ -193,7 +193,7 @@ function drawSteps(s) {
   place("steps").replaceChildren(
     does(s, s.diagnosis ? "Diagnose again" : "Diagnose", { command: "diagnose", model }, { id: "diagnose", class: s.diagnosis ? "" : "primary" }),
     does(s, s.discovery ? "Discover again" : "Discover", { command: "discover", model }, { id: "discover" }),
-    el("p", { class: "muted" }, "Diagnose refits every effect of the catalogue. Discover looks for a term that no catalogue has."),
+    el("p", { class: "muted" }, "Diagnose refits every effect of the catalogue. Discover looks for a term outside the catalogue."),
   );
 }
 

@@ -71,7 +71,7 @@ fn clock_tree(chip: &Chip) -> Result<String> {
     let (pll, buses) = (chip.value(RCC_PLLCFGR), chip.value(RCC_CFGR));
     ensure!(
         field(chip.value(RCC_CR), 16, 4) & 0b101 == 0b101,
-        "the crystal's input is not on, or not in bypass"
+        "the crystal oscillator is off, or not in bypass mode"
     );
     ensure!(pll >> 22 & 1 == 1, "the PLL does not use the crystal");
     let input = CRYSTAL / f64::from(field(pll, 0, 6));
@@ -98,7 +98,7 @@ fn clock_tree(chip: &Chip) -> Result<String> {
     let waits = field(chip.value(FLASH), 0, 4);
     ensure!(waits == 2, "{waits} wait states");
     Ok(format!(
-        "8 MHz, PLL {:.0} MHz in and {:.0} MHz inside; core {:.0} MHz, APB1 {:.0} MHz; {waits} wait states",
+        "crystal 8 MHz, PLL input {:.0} MHz, PLL oscillator {:.0} MHz; core {:.0} MHz, APB1 {:.0} MHz; {waits} wait states",
         input / 1e6,
         inside / 1e6,
         fast / 1e6,
@@ -215,7 +215,7 @@ fn pins(chip: &Chip) -> Result<String> {
     ensure!(mode(GPIOC, 13) == 0, "B1 is no input");
     // The probe's own pins keep their state.
     ensure!([13, 14].map(|pin| mode(GPIOA, pin)) == [2, 2], "SWD is off");
-    Ok("PA0 and PA1 analogue, PA2 and PA3 AF7, PA5 output, PC13 input, SWD as it was".into())
+    Ok("PA0 and PA1 analogue, PA2 and PA3 AF7, PA5 output, PC13 input, SWD unchanged".into())
 }
 
 fn valve(chip: &Chip) -> Result<String> {
@@ -230,18 +230,18 @@ fn valve(chip: &Chip) -> Result<String> {
     let output = first(chip, "PB10's mode", |w| {
         w.address == GPIOB && field(w.value, 20, 2) == 1
     })?;
-    ensure!(low < output, "PB10 drove before it was low");
+    ensure!(low < output, "PB10 became an output before its level was low");
     let clock = first(chip, "the crystal", |w| w.address == RCC_CR)?;
     ensure!(
         output < clock,
-        "the valve was not closed before the first wait"
+        "the program waits for the clock before it closes the valve"
     );
     let raised = chip
         .written
         .iter()
         .any(|w| [GPIOB + 0x14, GPIOB + 0x18].contains(&w.address) && w.value >> 10 & 1 == 1);
     ensure!(!raised, "PB10 was high during the start");
-    Ok("low, then an output, before the clock is waited for".into())
+    Ok("PB10 is set low, then made an output, before the program waits for the clock".into())
 }
 
 fn serial(chip: &Chip) -> Result<String> {
@@ -280,10 +280,10 @@ fn watchdog(chip: &Chip) -> Result<String> {
     let [least, most] = [47e3, 17e3].map(|clock| cycles / clock);
     ensure!(
         least > 2.0 * PERIOD && most < 0.1,
-        "it waits {least} to {most} s"
+        "the watchdog restarts the board after {least} to {most} s"
     );
     Ok(format!(
-        "{:.0} to {:.0} ms until a restart, whatever its clock",
+        "restart after {:.0} to {:.0} ms, over the tolerance of the watchdog's clock",
         1e3 * least,
         1e3 * most
     ))

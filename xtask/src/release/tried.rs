@@ -149,7 +149,7 @@ pub(super) fn wheel(made: &Made) -> Result<()> {
     let recipe: Vec<&str> = lines.filter_map(|line| line.strip_prefix("    ")).collect();
     let [install, export, simulate] = recipe[..] else {
         anyhow::bail!(
-            "README.md has no three lines from `{}` on",
+            "README.md does not contain the three lines that begin with `{}`",
             FIRST_LINE.trim()
         );
     };
@@ -221,7 +221,7 @@ pub(super) fn wheel(made: &Made) -> Result<()> {
     said("pip uninstall --yes host-fit")?;
     ensure!(
         !environment.join("bin/host-fit").exists(),
-        "it remains after it was uninstalled"
+        "the program is still there after `pip uninstall`"
     );
     println!(
         "wheel: installed, exported, simulated: y = {last} after 2000 samples, equal to the program's"

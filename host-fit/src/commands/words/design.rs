@@ -116,7 +116,7 @@ fn optimum_words(optimum: &Optimum, period_s: f64) -> String {
     text.push('\n');
     text.push_str(&weighed_words(&optimum.weighed, law.period == 1));
     text.push_str(&format!(
-        "\nafter {} {:.3}; with the period 2 % off {:.3}; pole moduli {:.5} closed, {:.5} open",
+        "\nmean y after {} {:.3}, with the period 2 % off {:.3}; pole moduli {:.5} with the valve closed, {:.5} with it open",
         duration(RULES.long_until, period_s),
         optimum.mean_after_minutes,
         optimum.mean_detuned,
@@ -147,7 +147,7 @@ fn optimum_words(optimum: &Optimum, period_s: f64) -> String {
                 None => "with a receding horizon the valve stops switching or the model diverges".to_owned(),
                 Some(cycle_s) => format!(
                     "a receding-horizon law ends in a limit cycle of {:.0} ms ({:.0} % of it irregular), \
-                    which was evaluated with the other pulse trains",
+                    which was evaluated like the other pulse trains",
                     1000.0 * cycle_s,
                     100.0 * planned.irregular
                 ),
@@ -165,10 +165,10 @@ fn optimum_words(optimum: &Optimum, period_s: f64) -> String {
     text
 }
 
-/// What was weighed, and why steady blowing is better where it is.
+/// The objective, and the reason if steady blowing is better than pulses.
 fn weighed_words(weighed: &Weighed, is_steady: bool) -> String {
     let mut text = format!(
-        "weighed: mean y minus {} times the share of time open, the lowest with the period up to 2 % off",
+        "objective: mean y − {} × share of time open; the value is the lowest over periods up to 2 % off",
         weighed.air_price
     );
     let (Some(pulses), Some(steady)) = (weighed.pulses, weighed.steady_value) else {
@@ -184,7 +184,7 @@ fn weighed_words(weighed: &Weighed, is_steady: bool) -> String {
         && is_steady
     {
         text.push_str(&format!(
-            "\nwhy steady blowing: pulses lose more friction than their air is worth; they pay from --air-price {price:.3}"
+            "\nsteady blowing is best: pulses lose more friction than the saved air is worth; pulses are better from --air-price {price:.3} on"
         ));
     }
     text

@@ -114,7 +114,7 @@ impl Command {
         }
     }
 
-    /// The same kind of command with levels from `low` to 1.
+    /// A command of this kind with levels from `low` to 1.
     #[must_use]
     pub(crate) fn graded(self, low: f64, rng: &mut ChaCha8Rng) -> Self {
         if self.name.starts_with("random") {
@@ -126,7 +126,7 @@ impl Command {
         self.map(|u| if turned { -size * u } else { size * u })
     }
 
-    /// The same sequence with every level mapped.
+    /// This sequence with `level` applied to every level.
     pub fn map(mut self, level: impl Fn(f64) -> f64) -> Self {
         for u in &mut self.levels {
             *u = level(*u);

@@ -141,7 +141,7 @@ impl Session<'_> {
     }
 }
 
-/// The same commands, with many levels if an effect requires them or the input is `graded`; otherwise on/off.
+/// These commands with many levels if an effect requires them or the input is `graded`; otherwise unchanged, on/off.
 pub(crate) fn with_levels(
     commands: Vec<(Command, Use)>,
     effects: &[Effect],

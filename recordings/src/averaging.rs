@@ -136,7 +136,7 @@ pub enum AverageError {
     NothingLeft {
         /// The recording.
         place: Box<FilePlace>,
-        /// What was found instead.
+        /// Number of dropped periods by reason, in words.
         found: String,
     },
     /// The command repeats with another period than stated.

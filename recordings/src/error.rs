@@ -34,28 +34,28 @@ impl FilePlace {
         }
     }
 
-    /// The same place with a line number added.
+    /// Adds the line number to the place.
     #[must_use]
     pub fn at_line(mut self, line: u64) -> Self {
         self.line = Some(line);
         self
     }
 
-    /// The same place with a column name added.
+    /// Adds the column name to the place.
     #[must_use]
     pub fn in_column(mut self, column: &str) -> Self {
         self.column = Some(column.to_owned());
         self
     }
 
-    /// The same file and column, without a line or sample.
+    /// Removes line and sample from the place.
     #[must_use]
     pub(crate) fn whole(mut self) -> Self {
         (self.line, self.sample) = (None, None);
         self
     }
 
-    /// The same place with a TOML key added.
+    /// Adds the TOML key to the place.
     #[must_use]
     pub fn at_key(mut self, key: &str) -> Self {
         self.key = Some(key.to_owned());

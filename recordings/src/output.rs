@@ -14,7 +14,7 @@ pub enum OutputError {
     Io {
         /// The requested file or folder.
         path: PathBuf,
-        /// What the operating system said.
+        /// Message of the operating system.
         cause: io::Error,
     },
     /// The path names a folder, the root, or nothing.

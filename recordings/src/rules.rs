@@ -152,7 +152,7 @@ pub enum ChangeError {
     Value {
         /// The name.
         name: String,
-        /// What it needs.
+        /// Values that the rule accepts.
         needs: String,
     },
 }

@@ -32,7 +32,7 @@ impl Table {
         Self::load_beside(path, stated, 0)
     }
 
-    /// The same with this many bytes of memory already in use.
+    /// Loads a file while `taken` bytes of memory are already in use.
     pub(crate) fn load_beside(
         path: &Path,
         stated: Option<Stated>,

@@ -57,7 +57,7 @@ impl Command {
         }
     }
 
-    /// The same with a final rest, so that the valve has been closed for `rest` samples when the command repeats.
+    /// The command with a final rest, so that the valve has been closed for `rest` samples when it repeats.
     #[must_use]
     pub fn with_rest(mut self, rest: u32) -> Self {
         let tail = if self.runs.len().is_multiple_of(2) {

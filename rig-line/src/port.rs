@@ -111,7 +111,7 @@ impl Port {
         }
     }
 
-    /// The same line with transmission errors.
+    /// This line with transmission errors.
     #[must_use]
     pub fn with_faults(self, bad: Bad) -> Self {
         Self {

@@ -409,7 +409,7 @@ impl Session<'_, '_> {
     }
 }
 
-/// What has come of a turn.
+/// The samples received in one turn.
 struct Taken {
     /// Samples of a repeat.
     period: usize,

@@ -18,7 +18,7 @@ use crate::host::{Change, Event, Host, Streamed, word};
 use crate::log::{Columns, value};
 use crate::record::MOST_SAMPLES;
 
-/// What is watched and how long.
+/// Options of a watch.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plan {
     /// Arms the law after `rest_s`, and closes the valve at the end.
@@ -29,7 +29,7 @@ pub struct Plan {
     pub duration_s: f64,
     /// Longest log, s.
     pub log_s: f64,
-    /// How the model is judged.
+    /// Test of the model.
     pub test: Test,
 }
 
@@ -38,19 +38,19 @@ pub struct Plan {
 pub struct Now {
     /// Time, s.
     pub t: f64,
-    /// What the board does.
+    /// Phase of the board.
     pub phase: Phase,
     /// The reading, y.
     pub y: f64,
     /// y*, where the law has one.
     pub reference: Option<f64>,
-    /// What the model said.
+    /// Output of the model, y.
     pub model: Option<f64>,
     /// The valve.
     pub open: bool,
     /// Missing samples so far.
     pub lost: u64,
-    /// What is known of the model.
+    /// Verdict on the model so far.
     pub verdict: Verdict,
     /// Residual averaged over about 64 samples, y.
     pub residual: Option<f64>,
@@ -103,7 +103,7 @@ pub struct Watched {
     pub least_margin: Option<f64>,
     /// The changes of the law.
     pub changes: Vec<Changed>,
-    /// What is known of the model.
+    /// Verdict on the model so far.
     #[serde(flatten)]
     pub verdict: Option<Verdict>,
     /// The data set, if one was requested.

@@ -13,7 +13,7 @@ use axum::http::{Method, StatusCode};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 
-/// What a request has to match.
+/// Conditions that a request must meet.
 #[derive(Debug, Clone)]
 pub(crate) struct Guard {
     token: String,

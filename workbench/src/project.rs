@@ -20,7 +20,7 @@ pub struct Node {
     pub parent: Option<u32>,
     /// The step in a few words: `identified`, `+ plenum-droop`.
     pub step: String,
-    /// The same as a command.
+    /// The step as a command line.
     pub command: String,
     /// The model's file, within the folder.
     pub file: String,
@@ -54,7 +54,7 @@ pub enum ProjectError {
     Io {
         /// The file or folder.
         path: PathBuf,
-        /// What the operating system said.
+        /// Message of the operating system.
         cause: io::Error,
     },
     /// Not written.
@@ -71,7 +71,7 @@ pub enum ProjectError {
     Tree {
         /// The file.
         path: PathBuf,
-        /// What is wrong.
+        /// The problem.
         cause: String,
     },
     /// Models of other data.

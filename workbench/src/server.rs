@@ -46,9 +46,9 @@ impl<E: std::error::Error> From<E> for Refusal {
 pub struct Download {
     /// Its name.
     pub name: String,
-    /// What it is, as in `text/html`.
+    /// Media type, for example `text/html`.
     pub kind: &'static str,
-    /// What is in it.
+    /// Content of the file.
     pub content: Vec<u8>,
 }
 
@@ -64,7 +64,7 @@ pub trait Bench: Send + Sync + 'static {
     /// # Errors
     /// [`Refusal`] in words for the user.
     fn records(&self, models: &[u32]) -> Result<String, Refusal>;
-    /// What is quick: choosing another model.
+    /// A request that is answered at once: choosing another model.
     ///
     /// # Errors
     /// [`Refusal`] in words for the user.

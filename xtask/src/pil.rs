@@ -15,7 +15,7 @@ pub(crate) const TASK: Task = Task {
     run: |arguments| pil(arguments).map(|_| ()),
 };
 
-/// What the run gave.
+/// Result of a run.
 #[derive(Clone, Debug)]
 pub(crate) struct Outcome {
     /// Mean instructions of each case.

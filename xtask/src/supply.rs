@@ -17,7 +17,7 @@ pub(crate) const TASK: Task = Task {
     run: |_| supply(),
 };
 
-/// What of `deny.toml` is read here.
+/// The keys of `deny.toml` that are read here.
 #[derive(Deserialize)]
 struct Rules {
     graph: Graph,

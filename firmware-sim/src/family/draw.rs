@@ -105,7 +105,7 @@ impl RigPlan {
         let (faults, names): (Vec<&str>, Vec<&str>) = names.iter().copied().partition(faulty);
         let draw = |name: &str| Fault::draw(name, &mut rng);
         self.plant.faults = faults.into_iter().filter_map(draw).collect();
-        // The same kinds with arbitrary parameters: only the kinds determine the rest of the rig.
+        // The kinds of effects alone, not their parameters, determine the rest of the rig.
         let mut kinds = self.plant.clone();
         for kind in Self::kinds(&names)? {
             if kind.identity().2 == Place::Transport {

@@ -206,7 +206,7 @@ impl RigPlan {
         }
     }
 
-    /// The same rig recorded in other units.
+    /// This rig recorded in other units.
     #[must_use]
     pub fn in_units(mut self, units: Units) -> Self {
         self.units = units;

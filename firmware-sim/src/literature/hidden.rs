@@ -123,7 +123,7 @@ impl Hidden {
         })
     }
 
-    /// The same effect in its initial state.
+    /// This effect in its initial state.
     #[must_use]
     pub fn at_rest(&self) -> Self {
         let mut rested = self.clone();

@@ -72,7 +72,7 @@ impl FlowDelay {
         }
     }
 
-    /// The same law with every delay multiplied by `factor`.
+    /// This law with every delay multiplied by `factor`.
     #[must_use]
     pub fn scaled(self, factor: f64) -> Self {
         match self {
@@ -221,7 +221,7 @@ impl BasePlant {
         }
     }
 
-    /// The same rig with a constant delay, drawn from 20–60 ms.
+    /// This rig with a constant delay, drawn from 20–60 ms.
     pub fn with_fixed_delay(mut self, rng: &mut ChaCha8Rng) -> Self {
         self.delay = FlowDelay::Fixed {
             delay_s: rng.random_range(0.020..0.060),
@@ -229,8 +229,8 @@ impl BasePlant {
         self
     }
 
-    /// The same rig with equal time constants: the linear base for graded commands, for which attachment and
-    /// separation have no sharp boundary.
+    /// This rig with equal time constants for attachment and separation. Graded commands need this linear base, because
+    /// they have no sharp boundary between the two.
     pub fn with_one_time_constant(mut self) -> Self {
         self.separate_s = self.attach_s;
         self

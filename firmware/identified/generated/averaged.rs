@@ -45,10 +45,10 @@ pub type Effects = ();
 pub type Base = Params<f32, 2, 2, 2, Delay, ()>;
 /// The model: its constants are part of the code.
 pub type Identified = Frozen<Constants, Effects>;
-/// What the model remembers.
+/// The state of the model.
 pub type IdentifiedState = StateOf<f32, Identified, Outputs, Jets>;
 
-/// What lags mean.
+/// Convention of the lags.
 pub const CONVENTION: LagConvention = LagConvention::OneStep;
 /// The response to jets of part strength.
 pub const GRADING: Grading = Grading::Proportional;

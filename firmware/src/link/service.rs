@@ -1,7 +1,7 @@
-//! What the board does for a host: plays its commands, streams its samples.
+//! The board's services for a host: it plays commands and streams samples.
 //!
-//! One host at a time controls the board. A command that it plays ends if no frame arrives for the link's timeout:
-//! the valve closes and [`Fault::Link`] is latched. A law that it armed continues without the host.
+//! One host at a time controls the board. If no frame arrives for the link's timeout, a command being played ends: the
+//! valve closes and [`Fault::Link`] is latched. An armed law continues without the host.
 
 use crate::controller::{Controller, Mode, Tick};
 use crate::fault::Fault;

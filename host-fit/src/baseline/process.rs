@@ -161,7 +161,7 @@ impl FirstOrder {
         run(shape, dead_time, self.level, self.gain, record)
     }
 
-    /// The same from sample to sample, exact for a command that is held between samples.
+    /// The model as a recursion, exact for a command that is held between samples.
     #[must_use]
     pub fn recursion(&self, period_s: f64) -> Recursion {
         let (shape, dead_time) = self.sampled(period_s);
@@ -202,7 +202,7 @@ impl SecondOrder {
         run(shape, dead_time, self.level, self.gain, record)
     }
 
-    /// The same from sample to sample, exact for a command that is held between samples.
+    /// The model as a recursion, exact for a command that is held between samples.
     #[must_use]
     pub fn recursion(&self, period_s: f64) -> Recursion {
         let (shape, dead_time) = self.sampled(period_s);

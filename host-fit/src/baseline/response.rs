@@ -132,7 +132,7 @@ impl Response {
         out
     }
 
-    /// The same as y_{k+1} = Σ a_i·y_{k−i} + Σ b_j·u_{k−m−j} for a unit of gain: a, b and m.
+    /// The response as the recursion y_{k+1} = Σ a_i·y_{k−i} + Σ b_j·u_{k−m−j} for gain 1: a, b and m.
     pub(super) fn recursion(&self) -> (Vec<f64>, Vec<f64>, usize) {
         let [[p, q], [_, s]] = self.phi;
         let ([b, db], [e, de]) = (self.now, self.before);

@@ -55,15 +55,15 @@ pub enum BoardError {
         "key `{key}`: the model stores {kept} samples for it. With the law the loop needs {bytes} bytes; the board has {most}. {remedy}"
     )]
     Memory {
-        /// What most of it is for.
+        /// Key that needs most of the memory.
         key: String,
-        /// How many samples that are.
+        /// Samples that are stored for this key.
         kept: usize,
-        /// What the loop takes.
+        /// Memory of the loop, bytes.
         bytes: usize,
-        /// What it may take.
+        /// Memory of the board for the loop, bytes.
         most: usize,
-        /// What to do.
+        /// The remedy.
         remedy: &'static str,
     },
 }

@@ -134,7 +134,7 @@ pub(super) fn types(model: &Model, law: &Written) -> Result<TokenStream, Codegen
         /// The effects, in physical order.
         pub type Effects = #chain;
         #identified
-        /// What the model remembers.
+        /// The state of the model.
         pub type IdentifiedState = StateOf<f32, Identified, Outputs, Jets>;
     })
 }
@@ -207,7 +207,7 @@ pub(super) fn coefficients(model: &Model, law: &Written) -> TokenStream {
         Grading::Switched => quote!(Grading::Switched),
     };
     quote! {
-        /// What lags mean.
+        /// Convention of the lags.
         pub const CONVENTION: LagConvention = #convention;
         /// The response to jets of part strength.
         pub const GRADING: Grading = #grading;

@@ -44,7 +44,7 @@ pub enum CodegenError {
          Identify the model again; scale the measured output if it is large."
     )]
     NotFinite {
-        /// What it is.
+        /// Name of the constant.
         name: &'static str,
         /// Its value.
         value: f64,
@@ -79,13 +79,13 @@ pub enum CodegenError {
     /// The designed law does not fit the model.
     #[error("the designed law does not fit the model: {0}; run `host-fit design` again")]
     Law(#[from] Unusable),
-    /// What was written is no Rust.
+    /// The generated code is not valid Rust.
     #[error(
         "the generated Rust cannot be parsed: {problem}. This is a fault of the tool; \
          report it with the model file."
     )]
     Malformed {
-        /// What the parser says.
+        /// Message of the parser.
         problem: String,
     },
 }

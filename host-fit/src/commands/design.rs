@@ -118,9 +118,9 @@ fn valve_time(text: &str) -> Result<TimeSpan, String> {
     }
     if let Some(count) = text.strip_suffix("samples").or(text.strip_suffix("sample")) {
         let count = count.trim().parse();
-        return count
-            .map(TimeSpan::Samples)
-            .map_err(|_| format!("`{text}` is not a whole number of samples; write it as `2samples`"));
+        return count.map(TimeSpan::Samples).map_err(|_| {
+            format!("`{text}` is not a whole number of samples; write it as `2samples`")
+        });
     }
     match text.parse() {
         Ok(TimeSpan::Seconds(seconds)) => Ok(TimeSpan::Seconds(seconds)),
@@ -130,7 +130,7 @@ fn valve_time(text: &str) -> Result<TimeSpan, String> {
     }
 }
 
-/// The same, above 0.
+/// A time above 0.
 fn some_time(text: &str) -> Result<TimeSpan, String> {
     match valve_time(text)? {
         TimeSpan::Samples(0) | TimeSpan::Seconds(0.0) => Err("a time above 0 is needed".into()),
@@ -157,7 +157,7 @@ struct ShortestTime<'a> {
     option: &'a str,
     /// The requested time.
     asked: Option<TimeSpan>,
-    /// What `rig.toml` measured, s.
+    /// The shortest time measured in `rig.toml`, s.
     measured: Option<f64>,
     /// The shortest time between two switches in the records, s.
     recorded: Option<f64>,

@@ -76,7 +76,7 @@ struct Request {
     /// Meaning of a lag τ: y_{k−τ} as printed in eq. (3), or y_{k+1−τ}.
     #[arg(long, value_enum, default_value_t = Lags::OneStep)]
     lags: Lags,
-    /// What the search minimises.
+    /// Objective of the search.
     #[arg(long, value_enum, default_value_t = Aim::FreeRun)]
     objective: Aim,
     /// Most evaluations of the objective.

@@ -129,7 +129,7 @@ impl Console {
         watch
     }
 
-    /// The same for a step without intermediate results: Ctrl-C ends the program.
+    /// Shows progress of a step without intermediate results: Ctrl-C ends the program.
     pub(crate) fn show_progress(self) -> Watch {
         static NEVER: AtomicBool = AtomicBool::new(false);
         Watch {

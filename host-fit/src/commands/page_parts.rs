@@ -348,7 +348,7 @@ pub(crate) const POLES: [(&str, bool); 6] = [
     ("damping ratio", true),
 ];
 
-/// What [`pole_rows`] are.
+/// Caption of [`pole_rows`].
 pub(crate) const POLES_ARE: &str = "The slowest poles of the recursion with a constant command, without effects; one of each conjugate pair.";
 
 /// The slowest poles of each model.

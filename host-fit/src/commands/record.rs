@@ -79,7 +79,7 @@ fn said(text: &str) -> Result<ChannelSaid, String> {
     }
 }
 
-/// What was recorded.
+/// The recordings of a run.
 #[derive(Serialize)]
 struct Recorded {
     recordings: Vec<Written>,

@@ -37,7 +37,7 @@ impl Tried {
         })
     }
 
-    /// What to do after a rejection.
+    /// The remedy after a rejection.
     fn next_step(&self) -> String {
         let passing: Vec<String> = self
             .targets

@@ -8,7 +8,7 @@ use crate::preparation::Preparation;
 pub(super) struct Begun {
     /// The record from the first sample that no earlier command influences.
     pub(super) whole: Record,
-    /// The same where an edge before the first sample was inferred: the response to it is excluded.
+    /// If an edge before the first sample was inferred: the record without the response to that edge.
     shown: Option<Record>,
 }
 

@@ -58,7 +58,7 @@ impl DeadTime {
         })
     }
 
-    /// The same in a unit `factor` times shorter: with the sampling period, seconds.
+    /// The dead time in another unit, multiplied by `factor`: seconds if that is the sampling period.
     #[must_use]
     pub fn scaled(self, factor: f64) -> Self {
         Self {

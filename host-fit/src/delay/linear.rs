@@ -72,8 +72,7 @@ impl Series {
         values.iter_mut().take(unused).for_each(|v| *v = 0.0);
     }
 
-    /// The same for a disturbance of y with this correlation of neighbouring samples: y and the responses are
-    /// prewhitened.
+    /// Prewhitens y and the responses, for a disturbance of y with this correlation of neighbouring samples.
     pub(crate) fn whitened(&self, correlation: f64) -> Self {
         let mut whitened = Self {
             whitening: correlation,
@@ -363,7 +362,7 @@ impl Free {
         delays: false,
     };
 
-    /// The same with b free or fixed.
+    /// These options with b free or fixed.
     pub(crate) fn with_order(self, order: bool) -> Self {
         Self { order, ..self }
     }
@@ -383,7 +382,7 @@ pub(crate) struct Refined {
     pub(crate) at: Evaluation,
     /// JᵀJ over the free parameters, row by row.
     information: Vec<f64>,
-    /// Those parameters.
+    /// The fitted parameters.
     free: Free,
 }
 

@@ -118,7 +118,7 @@ impl Dynamics {
 struct Memory(Vec<(usize, f64, Square)>);
 
 impl Plant {
-    /// The same dead time after every edge, the same dynamics with every command.
+    /// A plant with equal dead times after all edges and equal dynamics under all commands.
     pub(crate) fn linear(delay: f64, sum: f64, ratio: f64) -> Self {
         Self {
             delay: [delay; 2],
@@ -143,7 +143,7 @@ impl Plant {
         f64::midpoint(self.sum[0], self.sum[1])
     }
 
-    /// The same plant at a sampling period `factor` times longer.
+    /// This plant at a sampling period `factor` times longer.
     pub(crate) fn slower(&self, factor: f64) -> Self {
         Self {
             delay: self.delay.map(|h| h * factor),

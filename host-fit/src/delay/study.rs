@@ -87,7 +87,7 @@ pub struct ResponsePlant {
 pub struct EdgeDelay {
     /// Record, by name.
     pub record: String,
-    /// What the record is used for; only identify records enter the law.
+    /// Use of the record; only identify records enter the law.
     pub role: Use,
     /// The edge.
     pub edge: Edge,
@@ -159,7 +159,7 @@ pub struct DelayStudy {
     pub words: String,
     /// p-value of the law by a permutation test: H0 is that delays do not depend on ỹ.
     pub p_law: Option<f64>,
-    /// The same within rising and within falling edges.
+    /// p-value of the law by permutations within the rising and within the falling edges.
     pub p_law_within_direction: Option<f64>,
     /// p-value of the difference between rising and falling edges at the same ỹ (t test).
     pub p_direction: Option<f64>,

@@ -50,7 +50,7 @@ pub struct Bound {
 }
 
 impl Certificate {
-    /// The same in units `y` times as large.
+    /// The certificate with levels multiplied by `y`.
     pub(crate) fn scaled(self, y: f64) -> Self {
         match self {
             Self::Bound(bound) => Self::Bound(Bound {
@@ -250,7 +250,7 @@ impl Positive {
         [self.off.level(), self.on.level()]
     }
 
-    /// The same loop for −y: opening becomes closing.
+    /// This loop for −y: opening becomes closing.
     fn mirrored(&self) -> Self {
         let [open, closed] = self.hold;
         let [looks_open, looks_closed] = self.looks;

@@ -82,7 +82,7 @@ pub enum DesignError {
 }
 
 impl DesignError {
-    /// The same with levels in the user's units, the sensor's offset included.
+    /// The error with levels in the user's units, the sensor's offset included.
     pub(crate) fn outward(self, units: &Units) -> Self {
         let level = |y: f64| y * units.y + units.zero;
         match self {

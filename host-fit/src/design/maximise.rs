@@ -43,7 +43,7 @@ pub struct Planned {
     pub block_s: f64,
     /// Best value from rest: mean friction minus price times duty.
     pub value: f64,
-    /// The same value under steady blowing.
+    /// Value under steady blowing.
     pub steady_value: f64,
     /// Duty of the best command.
     pub duty: f64,
@@ -64,7 +64,7 @@ pub struct Optimum {
     pub law: Maximise,
     /// Mean friction of the model from 20 000 samples to 40 000 samples (20 s to 40 s at 1 kHz).
     pub mean: f64,
-    /// The same over the last 20 000 of 240 000 samples (of four minutes at 1 kHz).
+    /// Mean friction over the last 20 000 of 240 000 samples (of four minutes at 1 kHz).
     pub mean_after_minutes: f64,
     /// Lowest and highest friction in the same time as `mean`.
     pub range: [f64; 2],
@@ -75,7 +75,7 @@ pub struct Optimum {
     /// The lowest mean over periods 2 % shorter and longer. This is maximised, because a sharper resonance
     /// would not survive on a rig.
     pub mean_detuned: f64,
-    /// What decided.
+    /// The values that were compared.
     pub weighed: Weighed,
     /// Number of pulse trains with a higher mean that were rejected because the model diverges under them.
     pub refused: usize,
@@ -91,7 +91,7 @@ pub struct Optimum {
     pub planned: Option<Planned>,
 }
 
-/// What the search weighs: the mean friction minus the price of the air. Each value is the lowest of a train and of
+/// Values of the objective: mean friction minus the price of the air. Each value is the lowest over a pulse train and
 /// the same train with a period 2 % shorter and longer.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Weighed {

@@ -114,7 +114,7 @@ impl Proof {
         self.lost_where(|group| !group.decides())
     }
 
-    /// The same with levels as sensor readings with offset `zero`.
+    /// The result with levels as readings of a sensor with offset `zero`.
     #[must_use]
     pub fn shown_by(mut self, zero: f64) -> Self {
         if zero == 0.0 {

@@ -14,7 +14,7 @@ const LONGEST_CONSTANT: usize = 10_000;
 pub struct Steady {
     /// Friction of the flow, y.
     pub friction: f64,
-    /// What the sensor shows, y.
+    /// Reading of the sensor, y.
     pub reading: f64,
     /// Largest pole modulus under the command; above 1 the model is unstable.
     pub modulus: f64,

@@ -33,8 +33,8 @@ pub(crate) fn estimates(
     estimates_among(fit, &[], spec, units)
 }
 
-/// The same, including the choice of the structure: the scatter of the parameters over `alike`, models with the
-/// same effects and an equivalent validation error, is added to the variance.
+/// [`estimates`] with the uncertainty of the choice of structure: the scatter of the parameters over `alike`, models
+/// with the same effects and an equivalent validation error, is added to the variance.
 pub(crate) fn estimates_among(
     fit: &Fit,
     alike: &[&Model],

@@ -12,7 +12,7 @@ pub struct Memory {
     pub lag_s: f64,
     /// Change of the steady level per unit of y at that lag, without jets.
     pub weight: f64,
-    /// The same at full jet strength.
+    /// Change of the steady level per unit of y at that lag, at full jet strength.
     pub weight_blown: f64,
 }
 
@@ -66,7 +66,7 @@ pub(super) fn memory(model: &Model) -> Vec<Memory> {
             }
         })
         .chain(wakes)
-        // An integrator has no rate to weigh by.
+        // An integrator has no relaxation rate, so its weight is not finite.
         .filter(|memory| memory.weight.is_finite() && memory.weight_blown.is_finite())
         .collect()
 }
@@ -105,7 +105,7 @@ mod tests {
 
     #[test]
     fn lags_that_cancel_leave_no_rate_to_weigh_by() {
-        // The newest coefficient is 1; the relaxation of 0.02 per 1 − 31·0.02 samples is all in the far lag.
+        // The coefficient of lag 1 is 1, so the lag of 31 samples alone relaxes the flow: −0.02 in 1 − 31·0.02 samples.
         let found = memory(&model(&[(1, 1.0), (31, -0.02)], &[]));
         let [one] = found.as_slice() else {
             panic!("{found:?}")

@@ -38,7 +38,7 @@ use thiserror::Error;
 #[derive(Clone, Debug, Error)]
 #[non_exhaustive]
 pub enum DiagnoseError {
-    /// No record to learn from.
+    /// No estimation record.
     #[error(
         "the data set has no `identify` record to refit the model on. \
          Set `use = \"identify\"` for at least one record in dataset.toml."
@@ -52,12 +52,12 @@ pub enum DiagnoseError {
     Interrupted,
 }
 
-/// What to try, and how far.
+/// Options of a diagnosis.
 #[derive(Clone, Debug)]
 pub struct Options {
     /// Most effects added one after the other.
     pub most_effects: usize,
-    /// Seed of the search for the command that distinguishes alternatives.
+    /// Seed of the search for the command that distinguishes candidates.
     pub seed: u64,
 }
 
@@ -145,7 +145,8 @@ fn chosen(
         return Ok(session.conclude(given_alone.alone(), rungs, None));
     }
     progress("the model with the fewest lags");
-    // Data sets of other plants than flows: the user chooses the lags.
+    // Graded commands and records that start in mid-run: not a flow with jets, so the lags that the user chose are
+    // kept.
     let own_dynamics = mid_run && given.start == Start::Measured && !judge.on_off;
     let (root, step) = if own_dynamics {
         session.root_of_given()?

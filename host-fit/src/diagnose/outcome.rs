@@ -79,8 +79,8 @@ impl Rung {
         }
     }
 
-    /// The same with the free-run error over whole `records`, as `compare` computes it. Unchanged where the
-    /// step has no model; infinite if the run diverges.
+    /// Replaces the error of the step by the free-run error over whole `records`, as `compare` computes it. Unchanged
+    /// if the step has no model; infinite if the run diverges.
     pub(crate) fn as_compared(&mut self, records: &[Record]) {
         let Some(model) = &self.model else { return };
         let scores = score(model, records).map(|(scores, _)| scores);
@@ -117,13 +117,13 @@ impl Rung {
 pub struct Ranked {
     /// Its name.
     pub effect: String,
-    /// Validation error with it, y rms.
+    /// Validation error with the candidate, y rms.
     pub validate_rmse: f64,
     /// Reduction of the validation error, %.
     pub error_reduction_percent: f64,
-    /// Family-wise p-value against the model that it was added to, as its e-value bounds it; 1 if it was not refitted.
+    /// Upper bound (by the e-value) of the family-wise p-value of the candidate; 1 if it was not refitted.
     pub p_value: f64,
-    /// ln of the Bayes factor of the model with it against the model that it was added to, nats.
+    /// ln of the Bayes factor of the model with the candidate against the model without it, nats.
     pub gain_nats: Option<f64>,
     /// Fitted parameters by name.
     pub parameters: BTreeMap<String, ParameterEstimate>,
@@ -155,12 +155,12 @@ pub struct Diagnosis {
     /// The missing effects in the order added. Empty if the verdict is "unexplained" or "partly explained", even if
     /// the ladder shows effects that were tried.
     pub missing: Vec<String>,
-    /// Surrogates: effects that describe part of the model error without being significant. In addition to
-    /// `missing`, effects without which the error is within the uncertainty of the noise level.
+    /// Surrogates: effects that describe part of the model error without being significant. If effects are named in
+    /// `missing`, surrogates are further effects that are not needed to reach the noise level.
     pub stand_ins: Vec<String>,
-    /// Those of `stand_ins` that are certified although something else is unexplained (verdict "partly explained").
+    /// The surrogates that are certified although something else is unexplained (verdict "partly explained").
     pub certified: Vec<String>,
-    /// The equivalence set of each of `missing`, itself first.
+    /// The equivalence set of each effect in `missing`, that effect first.
     pub sets: Vec<Vec<String>>,
     /// Memories of the flow in the final model.
     pub memory: Vec<Memory>,
@@ -191,15 +191,16 @@ pub struct Diagnosis {
     pub evidence_nats: Option<f64>,
     /// The certificate of each effect of the best model, named or not.
     pub certificates: BTreeMap<String, Certificate>,
-    /// Evidence that the model with `missing` gains over the given model, with fewer parameters.
+    /// Parsimony: the model with `missing` has more evidence than the given model, with fewer parameters.
     pub parsimony: Option<Parsimony>,
-    /// Posterior probability of each member of each of `sets`.
+    /// Posterior probability of each member of each set in `sets`.
     pub posterior: Vec<Vec<f64>>,
     /// Candidates that could not be tried.
     pub not_tried: Vec<NotTried>,
     /// The experiment that would distinguish the members of an equivalence set.
     pub separation: Option<Separation>,
-    /// Family-wise p-value of the named effects or surrogates, as their e-value bounds it; none without any.
+    /// Upper bound (by the e-value) of the family-wise p-value of the named effects or surrogates; none if there are
+    /// none.
     pub p_value: Option<f64>,
     /// The final model.
     pub model: Model,

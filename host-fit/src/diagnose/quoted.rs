@@ -11,11 +11,11 @@ use serde::Serialize;
 pub struct Quoted {
     /// Their names.
     pub records: Vec<String>,
-    /// Root mean square of the given model's free-run error there, y.
+    /// Root mean square of the given model's free-run error on these records, y.
     pub before_rmse: f64,
-    /// Root mean square of the final model's free-run error there, y.
+    /// Root mean square of the final model's free-run error on these records, y.
     pub validate_rmse: f64,
-    /// The noise level there, y rms; none without y_sd.
+    /// The noise level on these records, y rms; none without y_sd.
     pub noise_rmse: Option<f64>,
 }
 

@@ -145,7 +145,7 @@ fn rated(
 }
 
 impl Session<'_> {
-    /// The ranking in the user's units of what was added to `context`.
+    /// The ranking of the candidates added to `context`, in the user's units.
     pub(super) fn ranked(
         &self,
         context: &Hypothesis,

@@ -25,7 +25,7 @@ rules! {
     /// they are surrogates.
     explained: f64 = 0.95, "share of the model error above the noise", "effects with an altered equation leave \
          1 to 4 % unexplained";
-    /// The same share where the noise level is unknown.
+    /// Share of the unexplained variance that named effects must explain if the noise level is unknown.
     explained_in_unknown_noise: f64 = 0.75, "share of the model error above the noise", "the public sets";
     /// Effects that explain less than this share of the unexplained variance are not named.
     most: f64 = 0.5, "share of the model error above the noise", "judgement: half";

@@ -169,7 +169,7 @@ impl Session<'_> {
             &found.best
         };
         let certificates = self.certificates(subject, &sets, &others, &found);
-        // A name stands only if no model that lacks it has more evidence.
+        // An effect is named only if no model without it has more evidence.
         let contradicted = order.iter().take(way.proven).any(|spec| {
             let certificate = certificates.get(spec.name);
             certificate.is_some_and(|certificate| certificate.evidence_nats < 0.0)
@@ -190,8 +190,7 @@ impl Session<'_> {
             .collect();
         let mut ranking = self.ranked(&context, &others, &found);
         for entry in &mut ranking {
-            // The ranking shows the parameters of the final model, and only the ambiguities that remain
-            // there.
+            // The ranking shows the parameters of the final model, and only equivalences that hold for that model.
             if let Some(own) = parameters.get(&entry.effect) {
                 entry.parameters.clone_from(own);
                 let set = sets.iter().find(|set| set.effect.name == entry.effect);

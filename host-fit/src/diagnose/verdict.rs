@@ -72,8 +72,8 @@ impl Session<'_> {
         self.without_what_lags_do(self.most_evident(found), &found.root)
     }
 
-    /// The best hypothesis, or one that lacks one of its effects as long as the latter has more evidence. That one
-    /// is refitted without the effect, or is the best of the search without it.
+    /// Removes effects from the best hypothesis while the hypothesis without the effect has more evidence. That
+    /// hypothesis is either refitted, or the best one without the effect that the search found.
     fn most_evident(&self, found: &Found) -> Hypothesis {
         let mut best = found.best.clone();
         let Some(likelihood) = Likelihood::of(self.judge(), best.judged.model()) else {
@@ -182,8 +182,8 @@ impl Session<'_> {
         let Some(certificate) = certificate else {
             return of_bare();
         };
-        // The share is counted from the best model without these effects, which may be the given one. It is that of the
-        // certificate, except where the given model has one of the effects already.
+        // The explained share is relative to the best model without these effects, which may be the given one. The
+        // certificate has the same reference, unless the given model already has one of the effects.
         let is_reference = as_given.rmse() < bare.judged.rmse() && !self.given_imitates(best);
         let without = match is_reference {
             true => as_given,
@@ -201,7 +201,7 @@ impl Session<'_> {
         };
         let leaner = is_leaner(best, bare);
         let known = judge.noise_source != NoiseSource::Scatter;
-        // Near a known noise level any effect with a small gain reaches it.
+        // Near a known noise level, even an effect with a small gain reaches that level.
         let least = if fits || explained {
             RULES.most
         } else {

@@ -118,7 +118,7 @@ impl Coordinate {
         }
     }
 
-    /// The same in the user's units.
+    /// The coordinate in the user's units.
     pub(super) fn out(&self, units: &Units) -> Self {
         let mut other = self.clone();
         if let Some(time) = other.time_mut() {
@@ -152,7 +152,7 @@ impl Coordinate {
         self.clone().time_mut().is_some()
     }
 
-    /// The same with its time constant multiplied by `factor`; `None` if it has none.
+    /// The coordinate with its time constant multiplied by `factor`; `None` without a time constant.
     pub(super) fn with_time_times(&self, factor: f64) -> Option<Self> {
         let mut other = self.clone();
         *other.time_mut()? *= factor;
@@ -167,7 +167,7 @@ impl Coordinate {
         }
     }
 
-    /// The same with another filter time constant.
+    /// The coordinate with another filter time constant.
     pub(super) fn with_fading(&self, time: f64) -> Self {
         let mut other = self.clone();
         if self.fading().is_some()

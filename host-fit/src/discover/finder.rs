@@ -71,8 +71,8 @@ impl Finder<'_> {
         }
     }
 
-    /// The same with more points where its curve is steepest, as long as they lower the error enough: a step may
-    /// lie between two points.
+    /// Adds points where the curve of a candidate is steepest, as long as they lower the error enough: a step may lie
+    /// between two points.
     fn finer(&self, candidate: Candidate) -> Candidate {
         let judge = self.search.judge;
         let mut last = candidate;

@@ -62,7 +62,7 @@ pub struct FoundTerm {
     pub coordinate_unit: &'static str,
     /// Share of the unexplained validation variance that the curve explains, %.
     pub excess_taken_percent: f64,
-    /// The same for the reported formula or curve.
+    /// Share of the unexplained validation variance that the reported formula or curve explains, %.
     pub formula_taken_percent: f64,
     /// Family-wise p-value of its gain, over all curves screened.
     pub p_value: f64,
@@ -128,7 +128,7 @@ pub(super) struct Found {
     pub(super) errors: Vec<f64>,
     /// The model with the term.
     pub(super) with: Hypothesis,
-    /// The same base without it, refitted.
+    /// The base model without the term, refitted.
     pub(super) without: Judged,
     pub(super) p: f64,
     /// Share of the unexplained variance that the curve explains.

@@ -24,9 +24,9 @@ rules! {
     promised: f64 = 0.5, "share", "judgement: the first-order gain is smaller than the gain after a refit";
     /// Curves that are fitted for a few iterations per round.
     tried: usize = 10, "", "judgement";
-    /// The same number for each base of lower order than the best.
+    /// Curves that are fitted for a few iterations, for each base of lower order than the best.
     tried_leaner: usize = 4, "", "judgement";
-    /// At most this many of them have the same place and kind of coordinate.
+    /// Most of these curves that have the same place and kind of coordinate.
     of_a_kind: usize = 2, "", "judgement: memories of neighbouring lengths have similar gains";
     /// Curves refitted in full, in addition to the best of each place and each base.
     finished: usize = 4, "", "judgement";

@@ -174,7 +174,7 @@ impl<'a> Context<'a> {
         self.curves(self.coordinates(), entries)
     }
 
-    /// The same with a finer grid of time constants.
+    /// Screens all coordinates with a finer grid of time constants.
     pub(super) fn closer(&self, entries: &[Entry]) -> Vec<Screened> {
         let mut all = self.coordinates();
         let between: Vec<_> = all
@@ -203,7 +203,7 @@ impl<'a> Context<'a> {
         coordinates(time_constant, self.longest, &channels)
     }
 
-    /// The same term with neighbouring time constants, if those were chosen from a grid.
+    /// This term with neighbouring time constants, if its own was chosen from a grid.
     pub(super) fn near(&self, term: &Term) -> Vec<Screened> {
         if term.fading.is_some() {
             return Vec::new();

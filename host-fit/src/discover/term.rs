@@ -67,7 +67,7 @@ impl Term {
         self.coordinate.has_time() && self.fading.is_none()
     }
 
-    /// The same with the coordinate's filter time constant as a parameter within `factor`, if it has one.
+    /// The term with the coordinate's filter time constant, if any, as a parameter within `factor`.
     pub(super) fn with_free_time(self, factor: f64) -> Self {
         let time = self.coordinate.fading();
         Self {
@@ -114,7 +114,7 @@ impl Term {
         format!("{entry}-by-{}{number}", slug.trim_end_matches('-'))
     }
 
-    /// The same in the user's units.
+    /// The term in the user's units.
     pub(super) fn out(&self, units: &Units) -> Self {
         let (of_x, of_g) = (self.coordinate.scale(units), self.entry.scale(units));
         let scaled = |values: &[f64], scale: f64| values.iter().map(|v| v * scale).collect();
@@ -217,8 +217,8 @@ impl Term {
         self.parameters().iter().map(|p| p.value).collect()
     }
 
-    /// The same curve with more points where it is steepest relative to its standard `errors`; points
-    /// collinear with their neighbours are removed if there are too many. `None` if nothing changes.
+    /// The curve with more points where it is steepest relative to its standard `errors`. If there are too many points,
+    /// those collinear with their neighbours are removed. `None` if nothing changes.
     pub(super) fn finer(&self, errors: &[f64]) -> Option<Self> {
         let Shape::Points { x, g, pinned } = &self.shape else {
             return None;
@@ -261,7 +261,7 @@ impl Term {
         })
     }
 
-    /// The same with other values.
+    /// The term with other parameter values.
     pub(super) fn with_values(&self, values: &[f64]) -> Self {
         let mut other = self.clone();
         let own: Vec<&mut f64> = match &mut other.shape {

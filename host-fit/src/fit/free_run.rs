@@ -260,7 +260,7 @@ impl<'a> FreeRunProblem<'a> {
     }
 }
 
-/// A derivative: up to two coordinates and how fast each of them moves.
+/// Direction of a derivative: up to two coordinates, each with its rate of change.
 type Slopes = [Option<(usize, f64)>; 2];
 
 /// y_sim and its derivatives along `slopes`, in as few runs as possible; `None` if it diverges.

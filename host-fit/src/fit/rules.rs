@@ -45,7 +45,7 @@ rules! {
     law_starts: usize = 3, "", "judgement, on simulated rigs";
     /// Initial time constants of the lowest-order model.
     time_constants_s: [f64; 3] = [0.02, 0.06, 0.2], "s", "judgement, in steps of 3";
-    /// Longest of the eight initial delays of that model.
+    /// Longest of the eight initial delays of the lowest-order model.
     longest_start_s: f64 = 0.12, "s", "twice the paper's delay";
     /// Lower limit of the largest value of a signal of order 1, for which the catalogue's ranges are valid; other
     /// signals are scaled.

@@ -26,7 +26,7 @@ pub struct Known {
 }
 
 impl Known {
-    /// Computes them for records in the units in which models are fitted.
+    /// The properties of records in the units in which models are fitted.
     #[must_use]
     pub fn of(records: &[&Record]) -> Self {
         let mut sorted_y: Vec<f64> = records.iter().flat_map(|r| r.y.iter().copied()).collect();
@@ -43,7 +43,7 @@ impl Known {
         }
     }
 
-    /// Computes them for cards and `model`; `y` and `u` are the sizes of the signals.
+    /// The properties that cards use, for `model`; `y` and `u` are the sizes of the signals.
     pub(crate) fn facts(&self, model: &Model, y: f64, u: f64) -> Facts<'_> {
         let period = model.sample_period_s;
         let record = self.longest as f64 * period;

@@ -294,7 +294,7 @@ pub(crate) fn core_law(law: &ExponentialDelay, factor: f64) -> CoreLaw {
 /// Samples per block with a common range of delays.
 const STRETCH: usize = 16;
 
-/// Number of refinements of an arrival interval; more rarely narrow it further.
+/// Number of refinements of an arrival interval; further ones rarely narrow it.
 const REFINEMENTS: usize = 3;
 
 /// Smallest and largest of some delays.

@@ -16,7 +16,7 @@ use crate::search::{
     Evaluation, Point, Progress, SearchReport, SearchStep, Settle, Speculative, Success, minimise,
 };
 
-/// Runs the search that the options ask for.
+/// Runs the search that the options specify.
 pub(crate) fn search(
     regression: Regression,
     options: &IdentifyOptions,

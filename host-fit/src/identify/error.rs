@@ -23,9 +23,9 @@ pub enum IdentifyError {
     /// An invalid structure.
     #[error("{what}. {remedy}")]
     Structure {
-        /// What is wrong.
+        /// The problem.
         what: String,
-        /// What to do.
+        /// The remedy.
         remedy: String,
     },
     /// A record shorter than the lags.

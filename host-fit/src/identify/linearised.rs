@@ -91,7 +91,7 @@ impl Filter<'_> {
             if gate == 0.0 {
                 drive.fill(0.0);
             } else {
-                // The newest output that a lane reads is the last of these.
+                // Position after the newest output that a lane reads.
                 let newest = LANES + reach + k + 4 - self.first - self.first_element;
                 let regressors = padded[newest - LANES..newest].iter().rev();
                 for (drive, y) in drive.iter_mut().zip(regressors) {

@@ -29,7 +29,7 @@ impl Objective {
 pub struct IdentifyOptions {
     /// Sizes and conventions of the model.
     pub structure: Structure,
-    /// What the search minimises.
+    /// Objective of the search.
     pub objective: Objective,
     /// Budget, seed and threads of the search.
     pub search: Settings,

@@ -28,9 +28,9 @@ pub struct Identified {
     /// The model, with sorted lags and without repeated ones. Its training record has objective and seed; the
     /// caller adds the rest.
     pub model: Model,
-    /// What was minimised.
+    /// Objective that was minimised.
     pub objective: Objective,
-    /// Its value with least-squares coefficients.
+    /// Value of the objective with least-squares coefficients.
     pub objective_value: f64,
     /// √Σ(y_{k+1} − prediction)² of the least-squares model over the identify
     /// records, summed directly from the samples.

@@ -69,7 +69,7 @@ pub struct Structure {
     /// Longest lag, samples, at least 1; lags run from 1 to it. Searched input
     /// delays do not exceed it either.
     pub longest_lag: u16,
-    /// What a lag means.
+    /// Convention of the lags.
     pub convention: LagConvention,
     /// Where the input delays come from.
     pub delay: InputDelay,

@@ -34,10 +34,10 @@ pub enum ModelError {
     Version {
         /// The file.
         place: String,
-        /// What was found.
+        /// Version in the file.
         found: i64,
     },
-    /// It cannot be understood.
+    /// The file is not a valid model.
     #[error("{place}: {problem}")]
     Syntax {
         /// The file.
@@ -52,10 +52,10 @@ pub enum ModelError {
         place: String,
         /// The key.
         key: String,
-        /// What is wrong.
+        /// The problem.
         problem: String,
     },
-    /// A user effect in it was refused.
+    /// A user effect in the file was refused.
     #[error(transparent)]
     Definition(#[from] DefinitionError),
     /// It could not be written.

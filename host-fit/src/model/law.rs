@@ -149,7 +149,7 @@ impl Law {
         }
     }
 
-    /// The same law with the trials in which attachment was lost.
+    /// The law, with the trials in which attachment was lost.
     #[must_use]
     pub fn which_lost(mut self, trials: Vec<String>) -> Self {
         match &mut self {

@@ -38,7 +38,7 @@ impl Model {
         self.memory_for(self.longest_delay())
     }
 
-    /// The same for input delays up to `delay` samples.
+    /// Memory of the model for input delays up to `delay` samples.
     #[must_use]
     pub fn memory_for(&self, delay: usize) -> Footprint {
         let window = self.averaging.window as usize;

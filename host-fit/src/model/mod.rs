@@ -70,7 +70,7 @@ pub struct Model {
     pub calibrated_at: Option<f64>,
     /// The user's own effects that are available to the model, used or not.
     pub definitions: Vec<&'static Definition>,
-    /// What the model was trained on.
+    /// Records and options of the identification.
     pub training: Training,
     /// The control law designed for the model, if one was.
     pub law: Option<Law>,

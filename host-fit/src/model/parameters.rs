@@ -103,7 +103,7 @@ impl Model {
         value.copied().unwrap_or(T::ZERO)
     }
 
-    /// The same model with another parameter vector; missing values keep theirs.
+    /// The model with another parameter vector; parameters without a new value stay.
     #[must_use]
     pub fn with_values(&self, values: &[f64]) -> Self {
         let mut model = self.clone();

@@ -96,7 +96,7 @@ fn woodbury(
     woodbury_of(&gram, variances)
 }
 
-/// The same from ZᵀZ, column by column: with C·Cᵀ = 1 + D^½ ZᵀZ D^½, L = D^½ C⁻ᵀ.
+/// Woodbury's factor from ZᵀZ, column by column: with C·Cᵀ = 1 + D^½ ZᵀZ D^½, L = D^½ C⁻ᵀ.
 #[allow(clippy::needless_range_loop, reason = "indices as in the equations")]
 fn woodbury_of(
     gram: &[[f64; EFFECTS]; EFFECTS],

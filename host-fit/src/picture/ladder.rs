@@ -15,7 +15,7 @@ pub struct LadderStep<'a> {
     pub rmse: f64,
 }
 
-/// The same errors for one validation record.
+/// The errors of the models on one validation record.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct LadderRecord<'a> {
     /// Name of the record.

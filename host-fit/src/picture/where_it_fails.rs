@@ -34,7 +34,7 @@ pub struct FailureView<'a> {
     pub bins: &'a [FailureBin],
 }
 
-/// What [`where_it_fails`] draws.
+/// Contents of the picture that [`where_it_fails`] draws.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct WhereItFails<'a> {
     /// Title; empty for none.

@@ -18,7 +18,7 @@ pub struct FirstOrder {
     pub level: f64,
     /// Share of the variance of y that is explained, up to 1.
     pub explained: f64,
-    /// What it leaves, y rms.
+    /// Residual of the reference response, y rms.
     pub left_rms: f64,
     /// Residual without the part that is constant within a record, y rms.
     pub varying_rms: f64,

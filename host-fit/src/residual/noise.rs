@@ -25,7 +25,8 @@ pub(super) fn floor(records: &[&Record], residual: &[Vec<f64>]) -> (Vec<Vec<f64>
     if let Some(measured) = measured {
         return (measured, NoiseSource::Measured);
     }
-    // What is rounded away scatters neither from sample to sample nor between repeats.
+    // If readings are rounded to equal values, the noise below the resolution shows neither from sample to sample nor
+    // between repeats.
     let rounding = rounding_variance(records.iter().map(|record| record.y.as_slice()));
     let repeats: Vec<f64> = records.iter().filter_map(|r| by_repeats(r)).collect();
     let (variance, source) = if repeats.is_empty() {

@@ -25,8 +25,8 @@ rules! {
     /// A coordinate's share must be this many standard errors above 0: about ten coordinates are tested in
     /// three ways each.
     share_standard_errors: f64 = 2.5, "standard errors", "limits false alarms over thirty tests; tested in `pure_noise_explains_nothing`";
-    /// The same for folds over whole records, lower because a single event per record has no reproducible
-    /// mean.
+    /// Required standard errors above 0 with folds over whole records; lower, because a single event per record has no
+    /// reproducible mean.
     record_standard_errors: f64 = 1.0, "standard errors", "judgement";
     /// For folds over whole records, the error must also occur at the same place in this share of the
     /// records.

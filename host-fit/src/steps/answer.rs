@@ -35,7 +35,7 @@ pub enum Tone {
 /// ```
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Answer {
-    /// What kind of result it is.
+    /// Kind of result.
     pub tone: Tone,
     /// The result in three to eight words, without a full stop.
     pub verdict: String,

@@ -12,7 +12,7 @@ pub struct EffectEntry {
     pub name: &'static str,
     /// Where it acts: `jet`, `delay`, `flow` or `sensor`.
     pub place: &'static str,
-    /// What it is.
+    /// The effect in one line.
     pub summary: &'static str,
     /// Its equation.
     pub equation: &'static str,

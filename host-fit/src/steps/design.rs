@@ -60,7 +60,7 @@ pub enum DesignOutcome {
 }
 
 impl Design {
-    /// The same design with the trials in which attachment was lost noted in its law.
+    /// This design; its law notes the trials in which attachment was lost.
     #[must_use]
     pub fn which_lost(self, trials: Vec<String>) -> Self {
         let law = self.law.clone().which_lost(trials);

@@ -48,7 +48,7 @@ pub struct IdentifyRequest {
     pub max_lag: Option<u16>,
     /// Meaning of a lag.
     pub lags: LagConvention,
-    /// What the search minimises.
+    /// Objective of the search.
     pub objective: Objective,
     /// Most evaluations of the objective.
     pub evaluations: usize,
@@ -69,7 +69,7 @@ pub enum DelayKind {
     Fixed,
     /// Falling with the averaged output, eq. (4); the law is measured on the records.
     StateDependent,
-    /// The same with a prescribed law.
+    /// Falling with the averaged output, with a prescribed law.
     Prescribed(ExponentialDelay),
 }
 
@@ -104,10 +104,10 @@ pub struct Identification {
     pub model: Model,
     /// The answer: verdict, evidence, confidence, next command.
     pub answer: Answer,
-    /// What was minimised.
+    /// Objective that was minimised.
     #[serde(serialize_with = "objective_name")]
     pub objective: Objective,
-    /// Its value with least-squares coefficients.
+    /// Value of the objective with least-squares coefficients.
     pub objective_value: f64,
     /// √Σ(y_{k+1} − prediction)² over the identify records.
     pub one_step_norm: f64,

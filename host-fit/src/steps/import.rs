@@ -17,7 +17,7 @@ pub struct ImportedSet {
     pub hash: String,
     /// Sampling period of the records, s.
     pub sample_period_s: f64,
-    /// What became of each file.
+    /// The result of each file.
     pub files: Vec<ImportedFile>,
     /// Remarks on the data set as a whole: periods that were unified, no validation record.
     pub remarks: Vec<String>,

@@ -16,7 +16,7 @@ macro_rules! books {
             vec![$($room::RULES.book()),+]
         }
 
-        /// The same with their built-in values.
+        /// All rules with their built-in values.
         fn built_in() -> Vec<Rulebook> {
             vec![$($room::Rules::BUILT_IN.book()),+]
         }

@@ -230,7 +230,7 @@ fn plain_enough(found: &Found) -> Option<Hypothesis> {
     (near && !told && !is_plain(&best)).then(|| plain.clone())
 }
 
-/// The model with a constant delay, if its law is not distinguishable from one over the levels of the records. A
+/// The model with a constant delay, if its law is not distinguishable from a constant over the levels of the records. A
 /// law must vary by more than a sample, be positive, and have a significantly smaller error.
 fn without_needless_law(judge: &Judge, judged: Judged, laws: &[Delay]) -> Judged {
     let model = judged.model();

@@ -108,7 +108,7 @@ mod tests {
     use crate::model::Start;
     use crate::residual::plants::{base, records};
 
-    /// A constant that a linear fit left in the given model is no reason to fit one in every candidate.
+    /// A constant in the given model, left by a linear fit, does not make every candidate have one.
     #[test]
     fn a_constant_of_the_given_model_is_not_fitted_where_records_start_at_rest() {
         let records = records(&[], &[], 3);
@@ -135,7 +135,7 @@ mod tests {
         assert_eq!(restarted(&integrating, &records, Some(&reference)), None);
     }
 
-    /// A tank with white noise is known over the whole record; one with a random walk is not.
+    /// The level of a tank with white noise can be simulated over the whole record; with a random walk it cannot.
     #[test]
     fn a_tank_is_restarted_only_if_it_drifts() {
         let model = Model {

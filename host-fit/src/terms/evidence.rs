@@ -34,7 +34,7 @@ impl HeldOut {
         }
     }
 
-    /// The same after removal of the errors along the level's scatter; `measured` is Σ e² before that.
+    /// These errors, from which those along the level's scatter were removed; `measured` is Σ e² before that.
     pub(crate) fn beside_scatter(self, measured: f64) -> Self {
         Self { measured, ..self }
     }
@@ -117,7 +117,7 @@ pub(crate) fn p_value(worse: &HeldOut, better: &HeldOut) -> f64 {
     student(product, error, (effective - 1.0).max(1.0))
 }
 
-/// The common end of two series whose warm-ups differ in length.
+/// The last samples that two series have in common; their warm-ups differ in length.
 fn last_of_both<'a>(a: &'a [f64], b: &'a [f64]) -> (&'a [f64], &'a [f64]) {
     let n = a.len().min(b.len());
     (&a[a.len() - n..], &b[b.len() - n..])

@@ -103,7 +103,8 @@ impl Search<'_> {
                 done.push(term.name());
                 continue;
             }
-            // Near the noise level, a base term is replaced only by fewer parameters, or by as many at its own place.
+            // Near the noise level, a base term is replaced only by a term with fewer parameters, or by one with
+            // equally many at the same place.
             let less_only =
                 term.effect().is_none() && self.over(&hypothesis) <= RULES.near_the_floor;
             (self.progress)(&format!("candidates in place of {}", term.name()));

@@ -35,7 +35,7 @@ impl Judging {
 }
 
 impl Fold {
-    /// The same split with free runs restarted every `samples` samples.
+    /// This split with free runs restarted every `samples` samples.
     pub(crate) fn restarted(&self, samples: usize) -> Self {
         let judging = (self.judging.iter())
             .flat_map(|judging| pieces(&judging.record, judging.from, samples));
@@ -190,7 +190,7 @@ mod tests {
         assert!((fold.learning[1].t0 - 0.003).abs() < 1e-12);
     }
 
-    /// A run that began at the first validated sample would not know the commands on their way then.
+    /// A run that began at the first validated sample would lack the commands that are still in the delay.
     #[test]
     fn the_first_piece_follows_the_measurement_too() {
         let mut only = record("a", Use::Identify);

@@ -123,8 +123,8 @@ impl Search<'_> {
         })
     }
 
-    /// The same and, if an effect is at a bound, also the hypothesis with it. If the base model lacks terms, the
-    /// right effect may go to a bound and leave it when a further term is added.
+    /// Like `finish`, and if an effect is at a bound, also the hypothesis with that effect: if the base model lacks
+    /// terms, the right effect may go to a bound and leave it when a further term is added.
     pub(super) fn finish_with_bent(
         &self,
         terms: Vec<Term>,

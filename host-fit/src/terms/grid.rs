@@ -12,9 +12,9 @@ pub(super) fn longest_lag(period_s: f64, shortest: usize) -> u16 {
     longest.min(share).clamp(2.0, 4096.0) as u16
 }
 
-/// Whether the first-order prediction of an effect is useless at a wrong grid point: a threshold that is
-/// never crossed, or limits outside the range of the biased base. Such cards list their grid points, or their
-/// thresholds are steps.
+/// Whether the first-order prediction of an effect is useless at a wrong grid point: a threshold that is never crossed,
+/// or limits outside the range of the biased base. The card of such an effect lists its grid points, or has parameters
+/// that act in steps.
 pub(super) fn hides(spec: &Spec) -> bool {
     let mut parameters = spec.parameters.iter();
     let acts_in_steps = parameters.any(|p| p.influence == Influence::Stepwise);

@@ -14,7 +14,7 @@ use model_core::effects::SPECS;
 const RANKED: usize = 256;
 const RANKED_SAMPLES: usize = 2000;
 
-/// Those of [`measured_inputs`] that a diagnosis of `given` tries. If there are many, those whose response (a
+/// The [`measured_inputs`] that a diagnosis of `given` tries. If there are many, the inputs whose response (a
 /// first-order lag with dead time) explains most of the residual of `given`.
 #[must_use]
 pub(crate) fn leading_inputs(given: &Model, records: &[Record]) -> Vec<&'static Definition> {

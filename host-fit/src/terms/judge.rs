@@ -60,8 +60,8 @@ pub struct Judge {
     identify: Vec<Record>,
     /// Whether the command is on/off.
     pub on_off: bool,
-    /// Whether a full jet is a command of 1 in the user's units; the fraction of full strength has no meaning
-    /// in others.
+    /// Whether a full jet is a command of 1 in the user's units; otherwise the fraction of full strength has no
+    /// meaning.
     pub(crate) full_is_one: bool,
     /// Noise variance σ² per validation sample, without the scatter of the level.
     floor: Vec<Vec<f64>>,
@@ -369,7 +369,7 @@ impl Judge {
         p_above_noise(held_out, &self.floor, margin * margin)
     }
 
-    /// The other responses to jets of part strength than that of `own`.
+    /// All responses to jets of part strength except that of `own`.
     pub(crate) fn other_gradings(&self, own: Grading) -> Vec<Grading> {
         let others = Grading::ALL.into_iter();
         others

@@ -6,8 +6,8 @@ use crate::parallel;
 use model_core::effect::Place;
 
 impl Search<'_> {
-    /// The same structure with the delay law of the catalogue that fits best with it, those in `forgotten`
-    /// excluded. `None` if the present law fits equally well.
+    /// The structure with the best-fitting delay law of the catalogue, those in `forgotten` excluded. `None` if the
+    /// present law fits equally well.
     #[must_use]
     pub fn after_another_law(
         &self,

@@ -83,9 +83,9 @@ impl<'a> Likelihood<'a> {
 /// the share of the prior volume that the data leave. `None` if the free run or a derivative of it diverges. Coordinates that act
 /// in steps have no derivative and no penalty.
 ///
-/// ln Z = ℓ(θ̂) + ½ gᵀH⁻¹g − ½ ‖θ̂ − μ‖²_Λ + ½ ln|Λ| − ½ ln|H| with H = JᵀΣ⁻¹J + Λ and g = JᵀΣ⁻¹r − Λ(θ̂ −
-/// μ), since θ̂ is the least-squares estimate. Priors are normal: the range of a parameter is four standard
-/// deviations, of its logarithm for times and frequencies; coefficients are of size 1.
+/// ln Z = ℓ(θ̂) + ½ gᵀH⁻¹g − ½ ‖θ̂ − μ‖²_Λ + ½ ln|Λ| − ½ ln|H| with H = JᵀΣ⁻¹J + Λ and g = JᵀΣ⁻¹r − Λ(θ̂ − μ), since θ̂
+/// is the least-squares estimate. Priors are normal: the range of a parameter is four standard deviations, of its
+/// logarithm for times and frequencies; priors of coefficients have size 1.
 pub(super) fn evidence(judge: &Judge, model: &Model, records: &[Weighed]) -> Option<f64> {
     let free = judge.free(model);
     let all = model.coordinates();

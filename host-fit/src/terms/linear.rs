@@ -23,11 +23,11 @@ pub(crate) fn baselines(frame: &Model, records: &[&Record]) -> Vec<Model> {
         .collect()
 }
 
-/// A linear model with the given lags, its inputs a sample apart behind `delay` samples.
+/// A linear model with these coefficients; its input delays are `delay`, `delay` + 1, … samples.
 fn linear(frame: &Model, a: Vec<f64>, b: Vec<f64>, constant: f64, delay: f64) -> Model {
     let lags: Vec<u16> = (1..=a.len() as u16).collect();
     let whole = delay.max(0.0);
-    // The factors of a law are relative, so a delay below one sample cannot have one.
+    // Several inputs have fixed delays: the factors of a law are relative to a delay that may be 0.
     let delays: Vec<u16> = (0..b.len() as u16)
         .map(|later| (whole.round().clamp(0.0, 60_000.0) as u16) + later)
         .collect();
@@ -50,8 +50,8 @@ fn linear(frame: &Model, a: Vec<f64>, b: Vec<f64>, constant: f64, delay: f64) ->
 }
 
 /// The better one of first and second order, with one delay and without products. It is the model for records whose
-/// command changes too seldom to identify how any parameter depends on y. Fit and choice use all samples, because
-/// no later samples follow a change of the command.
+/// command changes too seldom to identify how any parameter depends on y. Both are fitted and compared on all samples,
+/// because validation samples would contain no change of the command.
 pub(super) fn alone(judge: &Judge, frame: &Model) -> Option<Model> {
     let found = Baselines::fit(&judge.everything());
     let period = frame.sample_period_s;
@@ -110,7 +110,7 @@ pub(super) fn second_order(
     })
 }
 
-/// A recursion whose inputs are combined into one, between samples.
+/// A recursion with its inputs combined into one at their mean delay, which may lie between samples.
 fn one_input(frame: &Model, found: Recursion) -> Model {
     let whole: f64 = found.b.iter().sum();
     let moment: f64 = found.b.iter().enumerate().map(|(i, b)| i as f64 * b).sum();

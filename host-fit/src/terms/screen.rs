@@ -27,9 +27,9 @@ pub(crate) struct Tangent {
     pub(crate) coefficients: Vec<f64>,
     /// Share of the error energy explained on the estimation samples.
     pub(crate) learned: f64,
-    /// The same on the validation samples.
+    /// Share of the error energy explained on the validation samples.
     pub(crate) held_out: f64,
-    /// Their change of the free run, orthogonal to the model's own sensitivities.
+    /// Change of the free run by the parameters, orthogonal to the model's own sensitivities.
     pub(crate) direction: Vec<f64>,
 }
 
@@ -155,7 +155,7 @@ impl<'a> Screen<'a> {
         self.joined_from(0, series)
     }
 
-    /// The same for the records from `first` on.
+    /// Scored samples of the records from `first` on, joined and averaged over neighbours.
     fn joined_from<'s>(&self, first: usize, series: impl Iterator<Item = &'s [f64]>) -> Vec<f64> {
         let mut all = Vec::new();
         for (index, series) in (first..).zip(series) {
@@ -232,7 +232,7 @@ impl<'a> Screen<'a> {
         self.change_on(0..self.records.len(), other)
     }
 
-    /// The same on some of the records.
+    /// The change of the free run over some of the records with another model; `None` if it diverges.
     pub(super) fn change_on(&self, which: Range<usize>, other: &Model) -> Option<Vec<f64>> {
         let pairs = self.records[which.clone()]
             .iter()
@@ -254,7 +254,7 @@ impl<'a> Screen<'a> {
         self.regress_with(columns, 0.0)
     }
 
-    /// The same with ridge regularisation, as a share of the mean square of the columns.
+    /// [`regress`](Self::regress) with ridge regularisation, as a share of the mean square of the columns.
     fn regress_with(&self, columns: &[&[f64]], ridge: f64) -> Option<(Vec<f64>, f64, f64)> {
         let scale = self.coefficients(&self.error, columns, ridge)?;
         let rest = less(&self.error, columns, &scale);
@@ -348,8 +348,8 @@ impl<'a> Screen<'a> {
         values
     }
 
-    /// Change of the free run by each parameter of an effect, linearised at its values in `other`: this model
-    /// with the effect, at an amplitude that leaves the run unchanged. `None` if it diverges.
+    /// Change of the free run by each parameter of an effect, linearised at its values in `other`, which is this model
+    /// with the effect at an amplitude that leaves the run unchanged. `None` if it diverges.
     fn columns(&self, other: &Model, effect: &str) -> Option<Vec<Vec<f64>>> {
         let coordinates = other.coordinates();
         let own = |name: &str| name.split('.').next() == Some(effect);
@@ -370,7 +370,7 @@ impl<'a> Screen<'a> {
         Some(columns.collect())
     }
 
-    /// First-order prediction for those parameters together; `None` if they change nothing.
+    /// First-order prediction for all parameters of an effect together; `None` if they change nothing.
     pub(crate) fn tangent(&self, other: &Model, effect: &str) -> Option<Tangent> {
         let columns = self.columns(other, effect)?;
         let all: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();

@@ -685,7 +685,7 @@ impl Search<'_> {
         rest
     }
 
-    /// The same, starting from `model`, which already lacks the term.
+    /// A hypothesis refitted without one of its terms, starting from `model`, which already lacks it.
     pub(super) fn less(
         &self,
         hypothesis: &Hypothesis,

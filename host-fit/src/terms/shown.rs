@@ -17,7 +17,7 @@ const SAME: f64 = 1e-6;
 pub(crate) struct Shown {
     /// Energy of the model's error.
     pub(crate) error: f64,
-    /// What remains of the change after regression on 0, 1, 2 … unnamed terms.
+    /// Residual of the change after regression on 0, 1, 2 … unnamed terms.
     pub(crate) beside: Vec<Left>,
 }
 
@@ -38,8 +38,8 @@ pub(crate) struct Unnamed {
 }
 
 impl Unnamed {
-    /// All unnamed terms that are linear in an amplitude on the screen's model. A term in the jet path is
-    /// excluded: it is present with its time constant or absent.
+    /// All unnamed terms that are linear in an amplitude on the screen's model. Terms in the jet path are excluded,
+    /// because they are not linear in an amplitude.
     pub(crate) fn of(screen: &Screen, known: &Known) -> Self {
         let Table {
             candidates,
@@ -201,7 +201,7 @@ mod tests {
         (model, records)
     }
 
-    /// Its delay would imitate the first samples of the response.
+    /// The delay of a pickup would imitate the first samples of the response.
     #[test]
     fn a_pickup_is_no_candidate_where_the_flow_answers_at_once() {
         let (model, records) = linear();

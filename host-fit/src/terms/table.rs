@@ -23,7 +23,7 @@ pub struct Candidate {
     pub term: Term,
     /// Share of the error energy explained on the estimation samples.
     pub learned: f64,
-    /// The same on the validation samples.
+    /// Share of the error energy explained on the validation samples.
     pub held_out: f64,
     /// Its columns in the table of changes.
     pub(super) columns: Vec<usize>,
@@ -32,13 +32,13 @@ pub struct Candidate {
 /// A screened effect.
 struct Rated {
     term: Term,
-    /// The model with it.
+    /// The model with the effect.
     with: Model,
-    /// Its change of the free run on the estimation samples, orthogonal to the model's own sensitivities.
+    /// Change of the free run by the effect on the estimation samples, orthogonal to the model's own sensitivities.
     column: Vec<f64>,
-    /// The components of its change along the directions of the basis, which were subtracted.
+    /// The components of that change along the directions of the basis, which were subtracted.
     along: Vec<f64>,
-    /// Factor on its amplitude that fits the error best.
+    /// Factor on the effect's amplitude that fits the error best.
     scale: f64,
     /// Share of the error energy explained on the estimation samples.
     learned: f64,

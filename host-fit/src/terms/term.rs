@@ -118,7 +118,7 @@ impl Term {
         }
     }
 
-    /// The same kind of term at another lag.
+    /// A term of this kind at another lag.
     #[must_use]
     pub fn with_lag(&self, lag: u16) -> Self {
         match self {
@@ -129,7 +129,7 @@ impl Term {
         }
     }
 
-    /// The same term with another response to jets of part strength.
+    /// This term with another response to jets of part strength.
     #[must_use]
     pub fn with_grading(&self, grading: Grading) -> Self {
         let mut other = self.clone();
@@ -139,7 +139,7 @@ impl Term {
         other
     }
 
-    /// The same effect with other starting values.
+    /// This effect with other starting values.
     #[must_use]
     pub fn with_parameters(&self, values: Vec<f64>) -> Self {
         let mut other = self.clone();

@@ -15,7 +15,7 @@ use model_core::effects::ZERO_OFFSET;
 /// The sample period that cards are written for, s.
 const PERIOD_S: f64 = 0.001;
 
-/// The inner units in the user's.
+/// The inner units, expressed in the user's units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Units {
     /// Sensor reading that is y = 0 inside.
@@ -141,7 +141,8 @@ impl Units {
     #[must_use]
     pub fn model_in(&self, model: &Model) -> Model {
         let mut model = self.scale(&self.commanded_in(model), true);
-        // y of order one is friction with the calibration of the card; otherwise the calibration is the size of y.
+        // If y is of order one, it is friction, and the calibration of the card holds; otherwise the calibration is the
+        // size of y.
         let of_order_one = (FIT.order_one_low..FIT.order_one_high).contains(&self.y);
         model.calibrated_at = of_order_one.then(|| 1.0 / self.y);
         self.move_zero(&mut model, -self.zero / self.y);

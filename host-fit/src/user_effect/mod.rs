@@ -50,7 +50,7 @@ pub enum DefinitionError {
         line: usize,
         /// From 1.
         column: usize,
-        /// What is wrong.
+        /// The problem.
         problem: String,
     },
     /// A key has an invalid value.
@@ -60,7 +60,7 @@ pub enum DefinitionError {
         place: String,
         /// The key.
         key: String,
-        /// What is wrong.
+        /// The problem.
         problem: String,
     },
     /// An invalid expression.
@@ -74,7 +74,7 @@ pub enum DefinitionError {
         line: usize,
         /// Column in that line, in characters from 1.
         column: usize,
-        /// What is wrong.
+        /// The problem.
         problem: String,
     },
 }

@@ -363,7 +363,7 @@ impl Writer {
         fields
     }
 
-    /// What it remembers.
+    /// The state of the effect.
     fn memory(&self) -> Vec<Field> {
         let mut memory = Vec::new();
         if self.is_clocked() {
@@ -414,7 +414,7 @@ impl Writer {
                 #[derive(Clone, Copy, Debug, PartialEq)]
                 pub struct #own { #(#declared),* }
 
-                /// What it remembers.
+                /// The state of the effect.
                 #[derive(Clone, Copy, Debug, PartialEq)]
                 pub struct State { #(#remembered),* }
 

@@ -83,7 +83,7 @@ impl Parameter {
         }
     }
 
-    /// The same, but model files may leave it out: it then has this value.
+    /// The parameter is optional in model files, with this value if it is left out.
     #[must_use]
     pub const fn or_else(self, value: f64) -> Self {
         Self {
@@ -92,7 +92,7 @@ impl Parameter {
         }
     }
 
-    /// The same, but the output changes in steps.
+    /// The output changes in steps with this parameter.
     #[must_use]
     pub const fn stepwise(self) -> Self {
         Self {
@@ -101,7 +101,7 @@ impl Parameter {
         }
     }
 
-    /// The same, but negative values are not physical even if they are searched.
+    /// Negative values of this parameter are searched, but are not physical.
     #[must_use]
     pub const fn positive(self) -> Self {
         Self {
@@ -265,7 +265,7 @@ impl Amplitude {
         }
     }
 
-    /// The same for an effect that is proportional to it.
+    /// The effect is proportional to this amplitude.
     #[must_use]
     pub const fn linear(self) -> Self {
         Self {
@@ -274,7 +274,7 @@ impl Amplitude {
         }
     }
 
-    /// The same, if all parameters vanish together.
+    /// The effect vanishes only if all its parameters do.
     #[must_use]
     pub const fn together(self) -> Self {
         Self {
@@ -283,7 +283,7 @@ impl Amplitude {
         }
     }
 
-    /// The same with another number for reports.
+    /// Reports state another number in place of this amplitude.
     #[must_use]
     pub const fn said(self, said: Said) -> Self {
         Self {

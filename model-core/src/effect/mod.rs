@@ -64,7 +64,7 @@ pub struct Flow<T> {
 }
 
 impl<T: Real> Flow<T> {
-    /// The same with `drive` added to `next`.
+    /// The flow with `drive` added to `next`.
     #[inline]
     #[must_use]
     pub fn driven_by(&self, drive: T) -> Self {

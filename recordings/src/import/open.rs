@@ -20,7 +20,7 @@ impl Source {
         Self::open_beside(path, 0)
     }
 
-    /// The same with this many bytes of memory already in use.
+    /// Opens a file while `taken` bytes of memory are already in use.
     pub(super) fn open_beside(path: &Path, taken: u64) -> Result<Self, DataError> {
         Self::read_beside(path, &read(path, taken)?, taken)
     }

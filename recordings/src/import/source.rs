@@ -104,7 +104,7 @@ impl Unread {
 #[derive(Debug, Clone)]
 pub struct Source {
     pub(super) path: PathBuf,
-    /// What was read, in the order of the file.
+    /// The variables that were read, in the order of the file.
     pub variables: Vec<Variable>,
     /// Variables without a column of numbers: name and reason.
     pub skipped: Vec<(String, String)>,

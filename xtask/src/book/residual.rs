@@ -32,7 +32,7 @@ struct Case {
 enum Base {
     /// Gain 1, time constant 50 ms, delay 40 ms, on/off pulses.
     Usual,
-    /// The same with a level of −0.3 at rest.
+    /// As `Usual`, with a level of −0.3 at rest.
     BelowZero,
     /// Pulses of several strengths.
     Graded,

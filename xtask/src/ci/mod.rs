@@ -125,7 +125,7 @@ const STEPS: &[Step] = &[
         room: Some(Room::Firmware),
         run: crate::budgets::check,
     },
-    // The same at other periods, and the emulated board at one of them.
+    // Lockstep at other periods, and the emulated board at one of them.
     Step {
         name: "periods",
         after: &[SET_UP, BUILD],

@@ -230,7 +230,10 @@ fn valve(chip: &Chip) -> Result<String> {
     let output = first(chip, "PB10's mode", |w| {
         w.address == GPIOB && field(w.value, 20, 2) == 1
     })?;
-    ensure!(low < output, "PB10 became an output before its level was low");
+    ensure!(
+        low < output,
+        "PB10 became an output before its level was low"
+    );
     let clock = first(chip, "the crystal", |w| w.address == RCC_CR)?;
     ensure!(
         output < clock,

@@ -37,7 +37,7 @@ const SHELLS: [(&str, &str); 3] = [
 const PARTS: &str = "host-fit.cdx.json";
 const NOTICES: &str = "THIRD-PARTY.txt";
 
-/// What was made.
+/// The files of a release.
 struct Made {
     version: String,
     archive: PathBuf,
@@ -118,7 +118,7 @@ fn triple() -> Result<String> {
     Ok(triple.context("`rustc -vV` names no host")?.to_owned())
 }
 
-/// The same files give the same bytes: no times, no owners.
+/// Packs a folder without times and owners, so that equal files give equal bytes.
 fn pack(folder: &Path, name: &str, archive: &Path) -> Result<()> {
     let mut tar = command(
         "tar",

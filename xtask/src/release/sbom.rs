@@ -49,7 +49,7 @@ struct Kind {
     kind: Option<String>,
 }
 
-/// What of `Cargo.lock` is read here.
+/// The keys of `Cargo.lock` that are read here.
 #[derive(Deserialize)]
 struct Lock {
     package: Vec<Locked>,

@@ -389,7 +389,7 @@ macro_rules! catalogue {
                 match self { $(Self::$effect(effect) => parameters(effect),)+ }
             }
 
-            /// The same effect with one parameter changed.
+            /// This effect with one parameter changed.
             ///
             /// # Errors
             /// [`EffectError::UnknownParameter`] when the effect has no such parameter.

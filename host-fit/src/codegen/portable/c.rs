@@ -846,7 +846,7 @@ pub(super) fn counts(track: &Track) -> Vec<(&'static str, u32)> {
     ]
 }
 
-/// Those that are real, with their units.
+/// Constants of the law that are real numbers, with their units.
 pub(super) fn reals<T: Real>(track: &Track) -> Vec<(&'static str, f64, &'static str)> {
     let law = track.tracking::<T>();
     vec![

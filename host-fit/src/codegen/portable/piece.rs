@@ -31,7 +31,7 @@ impl Text {
     }
 }
 
-/// What differs between languages.
+/// The syntax in which the languages differ.
 pub(super) trait Tongue {
     /// A number.
     fn number(&self, value: f64) -> String;
@@ -102,11 +102,11 @@ pub(super) struct Piece {
 pub(super) struct Constant {
     pub(super) name: String,
     pub(super) value: f64,
-    /// What it is made of.
+    /// Its formula in the parameters.
     pub(super) formula: String,
 }
 
-/// What a piece is made for.
+/// The effect or law that a piece is generated for.
 pub(super) struct Made<'a> {
     pub(super) prefix: &'a str,
     pub(super) owner: &'a str,

@@ -52,7 +52,7 @@ pub(super) struct Sheet<'a> {
     pub(super) pace: (f64, f64, Option<usize>),
     /// Samples that are simulated before a run that does not begin at rest.
     pub(super) held: usize,
-    /// What the sensor shows at rest.
+    /// Reading of the sensor at rest.
     pub(super) zero: f64,
 }
 

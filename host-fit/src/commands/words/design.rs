@@ -250,7 +250,7 @@ pub(crate) const TRIALS: [(&str, bool); 11] = [
     ("steady blowing", true),
 ];
 
-/// What the table of trials shows.
+/// Caption of the table of trials.
 pub(crate) fn trial_caption(proof: &Proof) -> String {
     let interval = judged_interval(proof);
     let mut letters = interval.chars();

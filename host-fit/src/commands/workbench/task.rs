@@ -394,7 +394,7 @@ impl Task {
             from: Some(self.from),
             step: format!("+ {}", names.join(" + ")),
             command: line.text(),
-            // What was found is shown where it was asked for.
+            // The page stays with the model that was diagnosed.
             leaves: None,
         })?;
         Ok(())

@@ -15,7 +15,7 @@ use crate::stream::{Stream, stream};
 pub struct HiddenSetPlan {
     /// The rig with its hidden effects.
     pub plant: PlantSpec,
-    /// How it is measured.
+    /// Instruments of the rig.
     pub instrument: Instrument,
     /// Whether the free stream varies and is recorded as the channel `u_inf`.
     pub free_stream: bool,

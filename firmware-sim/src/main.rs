@@ -66,10 +66,10 @@ enum Command {
         /// Nuisance that is not an effect and must not be diagnosed as one; may be given several times.
         #[arg(long, value_parser = named(Nuisance::ALL.map(Nuisance::name)))]
         nuisance: Vec<String>,
-        /// Recorded times are the rig's times this factor.
+        /// Factor from the rig's times to recorded times.
         #[arg(long, default_value_t = 1.0)]
         time_factor: f64,
-        /// Recorded y are the rig's y times this factor.
+        /// Factor from the rig's y to recorded y.
         #[arg(long, default_value_t = 1.0)]
         y_factor: f64,
         /// Seed of the rig, the commands and the noise.

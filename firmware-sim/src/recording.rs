@@ -42,9 +42,9 @@ pub enum RigError {
 /// The units of the recording: the same samples with other numbers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Units {
-    /// Recorded times are the rig's times this factor.
+    /// Factor from the rig's times to recorded times.
     pub time: f64,
-    /// Recorded y are the rig's y times this factor.
+    /// Factor from the rig's y to recorded y.
     pub y: f64,
 }
 

@@ -33,7 +33,7 @@ pub enum Change {
 pub enum Unchanged {
     /// Outside its bounds.
     Outside,
-    /// The change before is not complete.
+    /// The preceding change is not complete.
     Pending,
     /// The law has no such setting.
     NoSetting,
@@ -170,7 +170,7 @@ where
     J: Memory<f32>,
     S: Smoothing,
 {
-    /// With the valve closed and the model in the state `at_rest`.
+    /// The law with the valve closed and the model in the state `at_rest`.
     pub fn new(design: D, model: M, at_rest: StateOf<f32, M, Y, J>, smoothing: S) -> Self {
         Self {
             state: design.start(&at_rest),

@@ -72,7 +72,7 @@ impl<M: Parts<f32>, Y: Memory<f32>, J: Memory<f32>, const A: usize> Designed<M, 
 
     fn change(&mut self, state: &mut Self::State, change: Change) -> Result<(), Unchanged> {
         match change {
-            // A target on its way is not replaced: one step at a time.
+            // The ramp to a target must end before another target is accepted.
             Change::Target(target) if self.reachable.check(target).is_ok() => {
                 let now = Designed::<M, Y, J, A>::reference(self, state);
                 if now != self.reference {

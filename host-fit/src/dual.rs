@@ -60,7 +60,7 @@ impl<const N: usize> Dual<N> {
         Self { lanes }
     }
 
-    /// In every lane `f` of both lanes and of `number`, which is 0 in the lane of the value.
+    /// Applies `f` in every lane to both operands and to `number`, which is 0 in the lane of the value.
     #[inline(always)]
     fn with(self, other: Self, number: f64, f: impl Fn(f64, f64, f64) -> f64) -> Self {
         let mut numbers = [number; N];

@@ -38,7 +38,7 @@ pub struct Demand {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ExcitationError {
-    /// Nothing to fit on.
+    /// No estimation record.
     #[error(
         "no record is marked use = \"identify\", so there is nothing to fit on; mark at least one"
     )]

@@ -39,7 +39,7 @@ pub enum ExtendError {
         "effect `{0}` is in the model already; each effect can be in it once. Leave out this `--effect`."
     )]
     Doubled(String),
-    /// No record to refit on.
+    /// No estimation record for the refit.
     #[error(
         "the data set has no `identify` record to refit the model on. \
          Set `use = \"identify\"` for at least one record in dataset.toml."
@@ -60,7 +60,7 @@ pub enum ExtendError {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum StructureKept {
-    /// That of the given model.
+    /// The structure of the given model.
     Given,
     /// The lowest order: one lag each and one input.
     Lean,
@@ -71,7 +71,7 @@ pub enum StructureKept {
 pub struct Extended {
     /// The model.
     pub model: Model,
-    /// Where its structure comes from.
+    /// The structure to which the effects were added.
     pub structure: StructureKept,
     /// Parameters of the added effects: by effect, by name.
     pub parameters: BTreeMap<String, BTreeMap<String, ParameterEstimate>>,
@@ -177,7 +177,7 @@ pub fn extend(
             _ => Ok::<Fit, ExtendError>(fit(&current, &learning, &options)?),
         }
     };
-    // The first of two effects imitates the second and may not recover: both orders are tried.
+    // The first of two effects may be fitted to imitate the second and stay there: both orders are tried.
     let with_all = |base: Model| {
         let forth = with_each(&base, &mut specs.iter());
         if specs.len() < 2 {

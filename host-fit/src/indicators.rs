@@ -31,7 +31,7 @@ pub struct Indicators {
     pub inside_envelope: Option<f64>,
 }
 
-/// Sums that the indicators come from; sums of several records add.
+/// Sums from which indicators are computed; sums of several records add.
 #[derive(Clone, Copy, Debug, Default)]
 struct Sums {
     samples: f64,

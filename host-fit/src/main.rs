@@ -1,7 +1,7 @@
 //! `host-fit`: from recordings of an on/off actuator and a sensor to a model with delayed inputs.
 //!
-//! Exit code 0: done. 1: something is wrong with the data, the model or the numbers; one paragraph on standard error says
-//! what and what to do. 2: wrong usage.
+//! Exit code 0: done. 1: an error in the data, the model or the numbers; one paragraph on standard error states it with
+//! the remedy. 2: wrong usage.
 
 mod commands;
 mod plants;

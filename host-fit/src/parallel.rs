@@ -11,7 +11,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 pub(crate) trait Items {
     type Item;
 
-    /// How many there are.
+    /// Number of items.
     fn count(&self) -> usize;
 
     /// The items by their indices; each is requested once.

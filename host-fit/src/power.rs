@@ -48,7 +48,7 @@ pub struct Detectable {
     pub parameter: String,
     /// The amplitude's unit.
     pub unit: String,
-    /// The amplitude that is named with 80 % power; none if no amplitude in the parameter's range is.
+    /// The amplitude that is named with 80 % power; none if this holds for no amplitude in the parameter's range.
     pub amplitude: Option<f64>,
     /// All parameters of the effect at that amplitude, in the order of its card.
     pub parameters: Vec<f64>,
@@ -92,7 +92,7 @@ struct Asked {
     deviations: f64,
     /// Threshold on the energy, as a share of the validation error's.
     share: f64,
-    /// Standard deviations that correspond to the required power.
+    /// Quantile of the normal distribution for the required power.
     often: f64,
 }
 
@@ -126,9 +126,9 @@ impl Asked {
         (scatter + wanted.sqrt()).max(self.deviations * left.deviation) / left.energy
     }
 
-    /// The factor on the amplitude at which the effect is detected: `margin` times the factor that passes with as
-    /// many unnamed terms in the model as lower the error enough. A single term may not do so although a pair does:
-    /// two neighbouring lags imitate an echo.
+    /// The factor on the amplitude at which the effect is detected: `margin` times the factor that passes with as many
+    /// unnamed terms in the model as lower the error enough. A pair of terms may lower the error although a single one
+    /// does not: two neighbouring lags imitate an echo.
     fn multiple(&self, shown: &Shown) -> f64 {
         let (mut x, mut beside) = (0.0_f64, 0);
         while let Some(left) = shown.beside.get(beside) {
@@ -276,7 +276,7 @@ mod tests {
         let records = records(&[], &[], 2);
         let model = base(&records);
         let effect = "hot-film-lag";
-        // How often, and what smaller ones do: `cargo xtask hidden-effects --group power`.
+        // `cargo xtask hidden-effects --group power` counts how often effects of this and of smaller sizes are named.
         assert_eq!(named(&model, &records, effect, 0.75), [effect]);
     }
 }

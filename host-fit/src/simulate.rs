@@ -365,12 +365,12 @@ impl Simulator<f64> {
 fn memory(model: &Model) -> Footprint {
     match model.delay {
         Delay::Fixed { .. } => model.memory(),
-        // Includes memory for a search to vary the law.
+        // With room for the longer delays that a search of the law may try.
         Delay::Law(_) => model.memory_for(model.longest_delay().max(ROOM)),
     }
 }
 
-/// Number of samples of that run before the first sample.
+/// Number of samples that are simulated before the first sample.
 pub(crate) fn held_samples(model: &Model) -> usize {
     let memory = memory(model);
     memory.outputs.max(memory.jets).max(wake_fades(model))

@@ -350,7 +350,7 @@ struct Arriving<'a, T, L, J> {
 }
 
 impl<T: Real, L: DelayLaw<T>, J: Memory<T>> Arriving<'_, T, L, J> {
-    /// The drive of the flow until the next sample through input delay `l`, and the jet present now: of a tap
+    /// The drive of the flow until the next sample through input delay `l`, and the jet present now. If the tap lies
     /// between samples, the newer jet arrives within the interval.
     #[inline(always)]
     fn jet(&mut self, l: usize) -> (T, T) {

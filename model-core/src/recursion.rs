@@ -118,7 +118,7 @@ impl<T: Real> Pace<T> {
 /// Precomputed partial sums of [`Bilinear::next`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Known<T> {
-    /// Of the a_i y_{k−τ_i}.
+    /// Sum of the terms a_i y_{k−τ_i}.
     pub free: T,
     /// Sum of the terms c_j1 y_{k−τ̄_j} of the first input.
     pub gain: T,

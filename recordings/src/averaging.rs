@@ -20,7 +20,7 @@ pub struct Averaging {
     /// Time after the first row at which the first period starts, s, ≥ 0: best at rest, because the command
     /// before a record counts as 0.
     pub start_s: f64,
-    /// On what the repeats are aligned.
+    /// Alignment of the repeats.
     pub align: Align,
     /// Allowed shift of an edge between repeats, samples, relative to the anchor.
     pub edge_jitter: usize,

@@ -270,9 +270,9 @@ pub enum DataProblem {
         "the rows are {found} s apart by their times, but {by} {stated} s; correct the one that is wrong"
     )]
     PeriodMismatch {
-        /// From the time column.
+        /// Sampling period from the time column, s.
         found: f64,
-        /// As stated.
+        /// Stated sampling period, s.
         stated: f64,
         /// Source of the stated period: subject and verb of a sentence.
         by: &'static str,
@@ -285,7 +285,7 @@ pub enum DataProblem {
     PeriodsDiffer {
         /// Of this record.
         found: f64,
-        /// Of the first record.
+        /// Sampling period of the first record, s.
         other: f64,
         /// Name of the first record.
         first: String,

@@ -20,13 +20,13 @@ pub enum OutputError {
     /// The path names a folder, the root, or nothing.
     #[error("{path} does not name a file; give a file name", path = .path.display())]
     NoFileName {
-        /// The path that was asked for.
+        /// The requested path.
         path: PathBuf,
     },
     /// A name inside a [`Staging`] folder that leads out of it.
     #[error("{path} leads out of the output folder; use a plain relative name", path = .path.display())]
     Outside {
-        /// The name that was asked for.
+        /// The requested name.
         path: PathBuf,
     },
 }

@@ -8,7 +8,7 @@ use thiserror::Error;
 /// One threshold.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Rule {
-    /// Its name, dashes for underscores.
+    /// Name of the rule, with dashes for underscores.
     pub name: String,
     /// Its value.
     pub value: Value,

@@ -84,9 +84,9 @@ impl PrintedTimes {
         }
     }
 
-    /// Whether times k·period + offset, rounded like the printed ones, reproduce all printed times. In addition
-    /// each time may deviate by the allowance for uneven steps. A few uncommon steps are not evidence of rounding
-    /// unless the clock counts whole seconds; with such a clock a repeated time is no evidence either.
+    /// Whether times k·period + offset, rounded like the printed ones, reproduce all printed times. In addition each
+    /// time may deviate by the allowance for uneven steps. A few uncommon steps are evidence of rounding only if the
+    /// clock counts whole seconds; a repeated time of such a clock is not.
     fn rounded(&self) -> Option<Rounded> {
         let last = self.time.len().checked_sub(1).filter(|&n| n >= 2)?;
         let unit = self.resolution();
@@ -136,8 +136,9 @@ impl PrintedTimes {
         })
     }
 
-    /// The time over which the mean step is computed, s, and its number of steps. If times repeat, it extends from
-    /// one new time to another, because those are known to a step, not only to the unit of the printed times.
+    /// The time over which the mean step is computed, s, and its number of steps. If times repeat, the span extends
+    /// from one change of the printed time to another. A change is known to within a step; other times are known to
+    /// within the printed unit only.
     pub(crate) fn span(&self) -> (f64, usize) {
         let changes =
             || (1..self.time.len()).filter(|&row| self.time.get(row) > self.time.get(row - 1));

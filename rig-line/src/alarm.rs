@@ -76,7 +76,7 @@ pub enum Verdict {
         residual: f64,
         /// Mean residual of all blocks before, y.
         usual: f64,
-        /// Deviation from them, standard deviations.
+        /// Deviation of the block from that mean, standard deviations.
         distance: f64,
         /// Evidence at which the alarm is raised.
         threshold: f64,

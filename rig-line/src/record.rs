@@ -40,13 +40,13 @@ pub struct Progress {
 /// Repeats that were played without interruption.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Part {
-    /// The board's sample count at the first of them.
+    /// The board's sample count at the first repeat of the part.
     pub board_sample: u64,
-    /// Complete repeats before it.
+    /// Complete repeats before the part.
     pub first_repeat: u32,
-    /// Complete repeats in it.
+    /// Complete repeats in the part.
     pub whole: u32,
-    /// Why it ended.
+    /// Why the part ended.
     pub ended: String,
 }
 
@@ -59,7 +59,7 @@ pub struct Gap {
     pub first: u32,
     /// Number of lost samples.
     pub samples: u32,
-    /// How many were dropped for lack of memory on the board; the others were lost on the line.
+    /// Number of these that were dropped for lack of memory on the board; the others were lost on the line.
     pub left_out: u32,
 }
 
@@ -76,14 +76,14 @@ pub struct Recording {
     pub gaps: Vec<Gap>,
     /// Received samples, including those of incomplete repeats.
     pub samples: u64,
-    /// Frames that came damaged.
+    /// Damaged frames.
     pub damaged_frames: u64,
     /// The reason for the end before all repeats were complete.
     pub cut_short: Option<String>,
 }
 
 impl Recording {
-    /// Samples that did not come.
+    /// Lost samples.
     #[must_use]
     pub fn lost(&self) -> u64 {
         self.gaps.iter().map(|gap| u64::from(gap.samples)).sum()
@@ -94,9 +94,9 @@ impl Recording {
 enum End {
     /// All was played.
     Played,
-    /// The board says why not.
+    /// The board closed the valve; its phase states the reason.
     Shut(Phase),
-    /// The line, or the board.
+    /// The line or the board failed.
     Broken(String),
 }
 
@@ -321,7 +321,7 @@ impl Session<'_, '_> {
     fn take(&mut self, taken: &mut Taken, streamed: &Streamed) -> Result<(), LineError> {
         let first = streamed.samples.first().map_or(streamed.next, |(n, _)| *n);
         if first < taken.next {
-            // Comes again, or of another turn.
+            // Received before, or of another turn.
             return Ok(());
         }
         self.gap(taken, first, Some(streamed.left_out));

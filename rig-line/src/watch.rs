@@ -76,7 +76,7 @@ pub struct Changed {
     pub t: f64,
     /// The change.
     pub change: String,
-    /// Why it was not made; `None` if it was.
+    /// Reason if the change was refused; `None` if it was made.
     pub refused: Option<String>,
 }
 
@@ -87,7 +87,7 @@ pub struct Watched {
     pub seconds: f64,
     /// Samples that came.
     pub samples: u64,
-    /// Samples that did not.
+    /// Samples that were lost.
     pub lost_samples: u64,
     /// While the law controls the valve: root mean square of y* − y, if the law has a reference.
     pub rms_error: Option<f64>,
@@ -121,7 +121,7 @@ fn some_text<S: serde::Serializer>(path: &Option<PathBuf>, to: S) -> Result<S::O
         .serialize(to)
 }
 
-/// How long nothing may come.
+/// Longest time without a message.
 const SILENCE: Duration = Duration::from_secs(2);
 /// Longest time in which the board may answer without a new sample.
 const NOTHING_NEW: Duration = Duration::from_secs(10);
@@ -133,7 +133,7 @@ const SETTLING: u64 = 1000;
 /// Weight of a residual in the average that the board compares with its limit.
 const SHARE: f64 = 1.0 / 64.0;
 
-/// Watches the loop behind `host`, changes it as `turn` returns until that is the end, and writes the log's
+/// Watches the loop behind `host`, makes the changes that `turn` returns until it returns the end, and writes the log's
 /// folder, if requested.
 ///
 /// The board answers a change before the next one is requested. A refused change is recorded, and the loop
@@ -355,7 +355,7 @@ impl Watcher {
                         sums.error += (reference - y).powi(2);
                     }
                 } else if runs {
-                    // Its time counts, but a transient is no baseline.
+                    // A sample of a transient counts for the time, but not for the baseline.
                     self.alarm.gap(1);
                 }
             }

@@ -21,7 +21,7 @@ use tokio::time::timeout;
 pub(crate) const LARGEST: usize = 256 << 10;
 /// The largest file that is uploaded, bytes; one at a time.
 pub(crate) const LARGEST_FILE: usize = 512 << 20;
-/// Where files are uploaded.
+/// Address to which files are uploaded.
 pub(crate) const UPLOAD: &str = "/api/upload/";
 
 /// Connections at a time: a browser opens six, and events hold one for each page.
@@ -97,7 +97,7 @@ pub(crate) async fn serve(listener: TcpListener, router: Router) -> std::io::Res
         let place = places.clone().acquire_owned().await;
         let (stream, _) = match listener.accept().await {
             Ok(accepted) => accepted,
-            // Out of file descriptors: some become free again.
+            // Out of file descriptors: waits until some are free.
             Err(_) => {
                 tokio::time::sleep(Duration::from_millis(50)).await;
                 continue;

@@ -26,7 +26,7 @@ pub struct Node {
     pub file: String,
     /// Root mean square error on the validation records, y; `None` if the free run diverges.
     pub rmse: Option<f64>,
-    /// The noise level there, y.
+    /// The noise level on the validation records, y.
     pub noise_rmse: Option<f64>,
     /// FIT on the validation records, %.
     pub fit_percent: Option<f64>,
@@ -66,7 +66,7 @@ pub enum ProjectError {
     /// Another workbench is open on it.
     #[error("{path} is open in another workbench; use that one, or close it", path = .0.display())]
     Locked(PathBuf),
-    /// A tree that is none.
+    /// `tree.json` is not a valid tree.
     #[error("{path} is not a tree of this version ({cause}); name another folder with --project", path = .path.display())]
     Tree {
         /// The file.
@@ -181,7 +181,7 @@ impl Project {
         Ok(())
     }
 
-    /// Says of which data set the next models are. Models of another one are moved with their results into a folder
+    /// Sets the data set of the next models. Models of the previous one are moved with their results into a folder
     /// `earlier-1`, `earlier-2` …, which is a project of its own and is returned.
     ///
     /// # Errors
@@ -251,7 +251,7 @@ impl Project {
         nodes.find(|n| n.id == id).ok_or(ProjectError::NoNode(id))
     }
 
-    /// Where a model's file lies.
+    /// Path of a model's file.
     ///
     /// # Errors
     /// [`ProjectError::Link`].
@@ -335,7 +335,8 @@ impl Project {
     }
 }
 
-/// A tree that people may have edited: its numbers differ, parents come first, files stay in the folder.
+/// Checks a tree that may have been edited by hand: numbers are unique, parents precede their children, files are
+/// inside the folder.
 fn check(tree: &Tree) -> Result<(), String> {
     if tree.format_version != FORMAT {
         return Err(format!("format_version {}", tree.format_version));

@@ -1,4 +1,4 @@
-//! Requests, and what they come to.
+//! Requests and their responses.
 
 use std::convert::Infallible;
 use std::net::{Ipv4Addr, TcpListener};
@@ -84,7 +84,7 @@ pub trait Bench: Send + Sync + 'static {
     /// # Errors
     /// [`Refusal`] in words for the user.
     fn name(&self, request: &Value) -> Result<String, Refusal>;
-    /// Does a piece of work.
+    /// Runs a task.
     ///
     /// # Errors
     /// [`Refusal`] in words for the user.
@@ -107,7 +107,7 @@ type At<B> = State<Arc<Shared<B>>>;
 /// this run's token.
 ///
 /// # Errors
-/// When the port cannot be had.
+/// If the port cannot be opened.
 pub fn serve(bench: impl Bench, port: u16, ready: impl FnOnce(&str)) -> std::io::Result<()> {
     let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port))?;
     listener.set_nonblocking(true)?;
@@ -144,7 +144,7 @@ fn router<B: Bench>(bench: B, rules: Guard) -> Router {
             intake::Uploads::new(),
             intake::take_in,
         ))
-        // Checked first: nothing is read of a foreign request.
+        // Checked first, so that the content of a foreign request is never read.
         .layer(middleware::from_fn_with_state(rules, guard))
 }
 

@@ -107,7 +107,7 @@ impl Work {
     }
 
     pub(crate) fn tell(&self, event: &Value) {
-        // Nobody listening is no fault.
+        // It is no error if no page is open.
         let _ = self.shared.events.send(event.to_string());
     }
 

@@ -16,14 +16,14 @@ pub(crate) const TASK: Task = Task {
     run: |arguments| changelog(&root(), arguments),
 };
 
-/// In the names of files, and as headings, in the order of a release.
+/// Kinds of changes: word in file names and heading, in the order of a release.
 const KINDS: [(&str, &str); 4] = [
     ("added", "Added"),
     ("changed", "Changed"),
     ("fixed", "Fixed"),
     ("removed", "Removed"),
 ];
-/// Before the newest release in `CHANGELOG.md`.
+/// Text at which the newest release begins in `CHANGELOG.md`.
 const NEWEST: &str = "\n## [";
 
 fn changelog(root: &Path, arguments: &[String]) -> Result<()> {

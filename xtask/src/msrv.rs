@@ -1,4 +1,4 @@
-//! The crates for boards, compiled by the oldest compiler that they say they need (`rust-version`).
+//! The crates for boards, compiled by the oldest compiler that they support (`rust-version`).
 
 use anyhow::{Context, Result, bail};
 
@@ -11,7 +11,7 @@ pub(crate) const TASK: Task = Task {
     run: |_| msrv(),
 };
 
-/// The crates that other people's programs for boards depend on. Everything else promises the compiler that CI tests with.
+/// The crates that other people's programs for boards depend on. All other crates support only the compiler of CI.
 const PUBLISHED: [&str; 2] = ["model-core", "wire"];
 const FIRMWARE: [&str; 2] = ["firmware", "identified"];
 

@@ -194,7 +194,7 @@ fn outside(packed: &BTreeSet<PathBuf>) -> Result<Vec<String>> {
     Ok(missing.collect())
 }
 
-/// The files in a rule `program: file file …` as make has it, without `.` and `..`.
+/// The files in a rule `program: file file …` in make's notation, without `.` and `..`.
 fn read_files(rule: &str) -> BTreeSet<PathBuf> {
     let Some((_, files)) = rule.lines().next().and_then(|line| line.split_once(": ")) else {
         return BTreeSet::new();

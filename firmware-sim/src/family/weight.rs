@@ -47,7 +47,7 @@ impl Weight {
     /// Samples used for effects of the catalogue.
     pub(super) const SAMPLES: usize = 5000;
 
-    /// Prepares them for effects that are added to `bare`.
+    /// Prepares the weights of effects that are added to `bare`.
     pub(super) fn new(
         bare: &PlantSpec,
         levels: &[f64],

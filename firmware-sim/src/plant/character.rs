@@ -104,8 +104,8 @@ impl Character {
         }
     }
 
-    /// The factor of the separation rate at friction `s`. Below rest it is that at rest: a lower rate would
-    /// make the flow diverge.
+    /// Factor on the separation rate at friction `s`. Below rest it keeps its value at rest: a lower rate would make
+    /// the flow diverge.
     pub(crate) fn separation(&self, s: f64) -> f64 {
         match self {
             Self::RateOfFriction { slope } => (1.0 + slope * s.max(0.0)).max(SLOWEST),

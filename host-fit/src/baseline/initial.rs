@@ -3,11 +3,11 @@
 use crate::linalg::dot;
 use std::ops::Range;
 
-/// The fewest samples of a record that its initial state is estimated from.
+/// Fewest samples of a record from which its initial state is estimated.
 const FEWEST: usize = 20;
-/// The share of a record that its initial state is estimated from.
+/// Share of a record from which its initial state is estimated.
 const SHARE: f64 = 0.05;
-/// The longest such share.
+/// Largest share, for processes that are slow compared with the first one.
 const LONGEST: f64 = 0.25;
 
 /// Free responses of a process to its initial state. The initial state is estimated from the first twentieth of the
@@ -31,12 +31,13 @@ pub(super) fn inner(a: &[f64], b: &[f64]) -> f64 {
 }
 
 impl InitialState {
-    /// Builds them for a record of `samples`; `fastest` is the shortest time of the process, samples.
+    /// The free responses for a record of `samples`; `fastest` is the shortest time of the process, samples.
     pub(super) fn new(free: Vec<Vec<f64>>, samples: usize, fastest: f64) -> Self {
         Self::between(free, samples, fastest, 0..0)
     }
 
-    /// The same, estimated from sample `known.start` on and at least up to `known.end`.
+    /// The free responses, with the initial state estimated from sample `known.start` on and at least up to
+    /// `known.end`.
     pub(super) fn between(
         free: Vec<Vec<f64>>,
         samples: usize,

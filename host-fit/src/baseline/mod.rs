@@ -35,9 +35,9 @@ pub struct Baselines {
 /// FIT of the three on the same scored samples, in percent. Serialises to `"baselines"` of `identify` and `compare`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct BaselineFits {
-    /// Of the first order with dead time.
+    /// FIT of the first order with dead time.
     pub fopdt: Option<f64>,
-    /// Of the second order with dead time.
+    /// FIT of the second order with dead time.
     pub sopdt: Option<f64>,
     /// Of ARX(2,2).
     pub arx: Option<f64>,
@@ -74,8 +74,8 @@ impl Baselines {
         WithDeadTime::to(learning)?.second_order()
     }
 
-    /// FIT of each over the scored samples of `records` together, in percent. Samples before `scored.start` are
-    /// simulated but not scored. `None` without a baseline, if a run is not finite, or if the scored y is constant.
+    /// FIT of each baseline over the scored samples of `records` together, in percent. Samples before `scored.start`
+    /// are simulated but not scored. `None` without a baseline, if a run is not finite, or if the scored y is constant.
     #[must_use]
     pub fn fit_percent(&self, records: &[(&Record, Range<usize>)]) -> BaselineFits {
         BaselineFits {

@@ -37,7 +37,7 @@ pub(super) struct Stretch {
 }
 
 impl Stretch {
-    /// For the scored samples `y` of a process.
+    /// The projected columns for the scored samples `y` of a process.
     pub(super) fn new(response: &Response, y: &[f64]) -> Self {
         let free = response.free(y.len());
         let initial = InitialState::new(free, y.len(), response.fastest());

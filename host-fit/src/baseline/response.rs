@@ -168,7 +168,7 @@ impl Response {
 impl Shape {
     fn fastest(self) -> f64 {
         match self {
-            // The only state is a value, which a few samples determine.
+            // The only state of a first order is its value, which a few samples determine.
             Self::First { .. } => 0.0,
             Self::Second { frequency, damping } => {
                 1.0 / (frequency * (damping + (damping * damping - 1.0).max(0.0).sqrt()).max(1.0))

@@ -17,7 +17,7 @@ const OVERHEAD: usize = 2 * 1024;
 #[derive(Clone, Debug, Error, PartialEq)]
 #[non_exhaustive]
 pub enum BoardError {
-    /// There is nothing to run.
+    /// The model has no law.
     #[error(
         "key `law`: the model has no law, which a board needs. Run `host-fit design` on it and use the file that it writes."
     )]
@@ -50,7 +50,7 @@ pub enum BoardError {
         /// The model's, s.
         period: f64,
     },
-    /// Too much to remember.
+    /// The memory of the model is too long for the board.
     #[error(
         "key `{key}`: the model stores {kept} samples for it. With the law the loop needs {bytes} bytes; the board has {most}. {remedy}"
     )]

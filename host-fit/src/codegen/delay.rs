@@ -11,7 +11,7 @@ pub(super) struct Written {
     pub(super) kind: TokenStream,
     /// Its constants.
     pub(super) constants: TokenStream,
-    /// The law, made of them.
+    /// The law as an expression of these constants.
     pub(super) value: TokenStream,
     /// Whether `value` is a constant: some laws are computed at the place of use, for the sample period.
     pub(super) is_constant: bool,

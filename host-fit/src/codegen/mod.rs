@@ -73,7 +73,7 @@ pub enum CodegenError {
          unstable. Identify it again, with fewer lags or `--objective free-run`."
     )]
     Unstable {
-        /// Where it left all bounds.
+        /// Samples after which the response is not finite.
         samples: u32,
     },
     /// The designed law does not fit the model.

@@ -44,9 +44,9 @@ pub(crate) struct Args {
     /// Level of y to hold, as measured, offset included (needed for `--goal track`).
     #[arg(long, value_name = "Y", allow_negative_numbers = true)]
     target: Option<f64>,
-    /// Shortest time the valve stays open, in seconds (`0.02`, `20ms`) or samples of the model (`2samples`);
-    /// seconds are rounded up to whole samples. Times shorter than measured in `rig.toml`, or without it
-    /// shorter than in the records, are refused [default: that time; 10 ms where neither is known].
+    /// Shortest time the valve stays open, in seconds (`0.02`, `20ms`) or samples of the model (`2samples`); seconds
+    /// are rounded up to whole samples. A time shorter than the shortest one in `rig.toml` (without it, in the records)
+    /// is refused [default: that shortest time; 10 ms if neither is known].
     #[arg(long, value_name = "S", value_parser = valve_time)]
     min_on: Option<TimeSpan>,
     /// Shortest time the valve stays closed, in the same form.

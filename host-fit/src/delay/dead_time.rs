@@ -117,7 +117,7 @@ fn log_determinant(matrix: &[f64], size: usize) -> f64 {
     sum
 }
 
-/// Density of the prior of b where there is a second time constant (probability ½): mostly without ringing.
+/// Density of the prior of b if there is a second time constant (probability ½); it favours plants that do not ring.
 fn prior(ratio: f64) -> f64 {
     if ratio <= 0.25 {
         1.6
@@ -126,8 +126,8 @@ fn prior(ratio: f64) -> f64 {
     }
 }
 
-/// The least b that is tried: `usual`, or less where S is so long, as of an integrator, that it would be a second lag of
-/// more than a fifth of a sample.
+/// The smallest b that is tried: `usual`, or less if S is so long (an integrator) that the second lag b·S would exceed
+/// a fifth of a sample.
 fn least_ratio(usual: f64, plant: &Plant) -> f64 {
     usual.min(0.2 / plant.mean_sum().max(1.0))
 }
@@ -220,7 +220,7 @@ pub(crate) fn dead_time(
         None => (0.01, 0.3),
     };
     let start = second.unwrap_or(first).at.plant;
-    // The density of b is that of half of the prior.
+    // Without third lags, b has half of the prior; with them, half of that each for the second and the third order.
     let of_second = if thirds.is_empty() { 1.0 } else { 2.0 };
     for direction in [1.0, -1.0] {
         let mut at = start;

@@ -130,7 +130,7 @@ fn dead_times_of_known_plants_are_right_and_within_their_intervals() {
     assert!(unmeasured * 20 <= edges, "{unmeasured} of {edges}");
 }
 
-/// Two time constants and a larger dead time look much the same.
+/// The response of a plant with two time constants resembles that of one time constant and a longer dead time.
 #[test]
 fn the_dead_time_before_three_lags_is_within_its_interval() {
     let (lags, delay) = ([50.0, 25.0, 15.0], 10);
@@ -463,7 +463,7 @@ fn an_integrator_has_a_dead_time() {
     });
 }
 
-/// Fourteen levels over the response: what is rounded away is noise that does not scatter from sample to sample.
+/// Fourteen levels over the response: rounding hides noise, which then does not scatter from sample to sample.
 #[test]
 fn a_coarse_converter_does_not_hide_the_dead_time() {
     all_within(8.0, 20.0, |u, deviates| {

@@ -32,7 +32,7 @@ pub(crate) struct Expectation {
 }
 
 impl Expectation {
-    /// For edges of this direction.
+    /// Expected arrival of a response to edges of this direction.
     pub(crate) fn of(&self, edge: Edge) -> Arrival {
         if edge.rising {
             self.rising

@@ -392,7 +392,7 @@ impl Refined {
     pub(crate) fn covariance(&self, noise: f64) -> Option<Vec<f64>> {
         let axes = self.free.axes();
         let size = axes.len();
-        // A response that is shifted by more than its own length is another one.
+        // The linearisation in h is valid for shifts up to the length of the response.
         let shift = 1.0 + self.at.plant.mean_sum();
         let [sum, ratio] = SCALES;
         let scales = [shift, sum, ratio, shift, sum];
@@ -520,8 +520,8 @@ pub(crate) fn fit(series: &[Series], starts: &[Plant], max_delay: f64) -> Vec<Re
     let Some(first) = least(&mut tried) else {
         return Vec::new();
     };
-    // The dead time of a first order contains small lags; in units of a very long S, as of an integrator, they are far
-    // below the other starts.
+    // The dead time of the first-order fit contains small lags. If S is very long (an integrator), their ratios to S
+    // are far below the other starts.
     let within = 0.5 * first.at.plant.mean_delay() / first.at.plant.mean_sum();
     let within = Some(within).filter(|ratio| *ratio > 0.0 && *ratio < STARTS[0]);
     let around = within.into_iter().chain(STARTS).map(|ratio| {

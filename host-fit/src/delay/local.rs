@@ -1,10 +1,10 @@
 //! The dead time of single edges, when the dynamics are known from all of them.
 //!
-//! On the *trajectory* of one plant through the record, one edge is moved in time. The best shift d of its
-//! response, K·Δu·(s(t − a − d) − s(t − a)), explains the residual around the edge, together with an offset. In a
-//! *window* an edge has its own level, initial state and gain, and shares only the time constants with the other
-//! edges. The time constants are searched in the windows too: to a plant with one dead time, dead times that differ
-//! between edges look like a second time constant.
+//! On the *trajectory* of one plant through the record, one edge is moved in time. The best shift d of its response,
+//! K·Δu·(s(t − a − d) − s(t − a)), explains the residual around the edge, together with an offset. In a *window* an
+//! edge has its own level, initial state and gain, and shares only the time constants with the other edges. The time
+//! constants are searched in the windows too, because a fit with one dead time takes differences of dead times between
+//! edges for a second time constant.
 
 use super::linear::{Series, evaluate, prewhiten};
 use super::onset::Unmeasured;

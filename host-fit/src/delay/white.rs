@@ -22,8 +22,8 @@ pub(crate) fn white_noise<'a>(records: impl Iterator<Item = &'a [f64]> + Clone) 
     (median / 0.455).max(rounding)
 }
 
-/// y with every outlier replaced by the mean of its neighbours. At an outlier y jumps and returns within one sample,
-/// which the response to a command that is held for several samples does not.
+/// y with every outlier replaced by the mean of its neighbours. At an outlier y jumps and returns within one sample. A
+/// response to a command that is held for several samples cannot do this.
 pub(crate) fn without_outliers(y: &[f64]) -> Vec<f64> {
     let least = OUTLIER * white_noise(std::iter::once(y)).sqrt();
     let mut out = y.to_vec();

@@ -6,12 +6,11 @@
 //! f_0(x) = d + Σ a_i y_{n−τ_i}, f_1(x) = d + b + Σ (a_i + c_i) y_{n−τ_i}.
 //!
 //! If all weights are at least 0 and their sums below 1, both maps are monotone, and every y ends between the two
-//! steady levels. Let L and H be the limits inferior and superior of y. The law stays open only while its
-//! prediction F_0 ≤ y*, and opens only at F_1 < y*. Both are monotone, so with the memory at L they bound the newest
-//! sample at the decision from above. From there at most the shortest on time of f_1, with the memory at H, bounds
-//! what follows, and a closed valve never raises y above (d + Σ_{i>0} a_i H)/(1 − a_0). The largest of these is a new
-//! bound of H; the mirrored statement bounds L. Iteration from the steady levels gives a decreasing sequence of
-//! intervals, each of which is valid.
+//! steady levels. Let L and H be the limits inferior and superior of y. The law stays open only while its prediction
+//! F_0 ≤ y*, and opens only at F_1 < y*. Both are monotone, so with the memory at L they bound the newest sample at the
+//! decision from above. From there f_1 acts for at most the shortest on time, with the memory at H. A closed valve
+//! never raises y above (d + Σ_{i>0} a_i H)/(1 − a_0). The largest of these is a new bound of H; the mirrored statement
+//! bounds L. Iteration from the steady levels gives a decreasing sequence of intervals, each of which is valid.
 //!
 //! Max-type functionals of positive delay systems: H. R. Feyzmahdavian, T. Charalambous, M. Johansson, IEEE TAC
 //! 59(6):1594, 2014. Theory 3.4.
@@ -27,7 +26,7 @@ use serde::Serialize;
 pub enum Certificate {
     /// The bound, valid from any start.
     Bound(Bound),
-    /// There is none.
+    /// The model has no bound.
     None {
         /// The condition that fails.
         reason: String,
@@ -37,9 +36,9 @@ pub enum Certificate {
 /// An interval around the target, y.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Bound {
-    /// Largest distance below the target in the end.
+    /// Largest distance below the target after the transient.
     pub below: f64,
-    /// Largest distance above it.
+    /// Largest distance above the target after the transient.
     pub above: f64,
     /// Prediction error for which the distances are stated a second time: 1 % of the reachable interval.
     pub error: f64,
@@ -165,7 +164,8 @@ struct Positive {
     on: Map,
     /// Shortest times open and closed, samples.
     hold: [usize; 2],
-    /// Samples after the arrival at which the law looks, with the valve open and closed: the mean of two.
+    /// Samples after the arrival at which the law predicts y, with the valve open and closed; it uses the mean of two
+    /// predictions.
     looks: [[usize; 2]; 2],
     /// Whether an edge may arrive between two samples, so that its first sample is a mixture.
     mixes: bool,
@@ -400,7 +400,7 @@ mod tests {
             min_off_s: off,
             ..TrackRequest::holding(target)
         };
-        // The corrections rest: the bound is of an exact prediction.
+        // No corrections, because the bound assumes an exact prediction.
         Track {
             integral_rate: 0.0,
             bias_rate: 0.0,
@@ -445,7 +445,8 @@ mod tests {
                 [0.040, 0.005],
             ] {
                 let law = law(&model, target, hold);
-                // At 0.25 an opening of 40 ms overshoots from the level without blowing: the valve stays closed.
+                // At a target of 0.25, an opening of 40 ms from the level without blowing overshoots the target: the
+                // valve stays closed.
                 let Certificate::Bound(bound) = certificate(&model, &law) else {
                     none += 1;
                     continue;
@@ -458,7 +459,7 @@ mod tests {
                     assert!(target - low <= bound.below + digits, "{place}: {low}");
                     assert!(high - target <= bound.above + digits, "{place}: {high}");
                     let share = (high - low) / (bound.below + bound.above);
-                    // A relay of single samples has no worst case in a row.
+                    // With hold times of one sample the worst cases of the bound do not follow one another.
                     let least = if hold[0] > 0.001 { 0.4 } else { 0.15 };
                     assert!(share > least, "{place}: {share}");
                 }
@@ -468,7 +469,7 @@ mod tests {
         assert!(none <= 2, "{none} of 16 without a bound");
     }
 
-    /// The bound is of the model: without corrections a flow with other levels leaves it.
+    /// The bound holds on the model only: without corrections a flow with other levels leaves it.
     #[test]
     fn another_flow_is_outside_the_certificate() {
         let model = model();

@@ -43,7 +43,7 @@ pub enum DesignError {
         on: bool,
         /// Time allowed for settling, s.
         seconds: f64,
-        /// Largest pole modulus under it.
+        /// Largest pole modulus under this command.
         modulus: f64,
     },
     /// Steady blowing does not raise the friction.
@@ -64,9 +64,9 @@ pub enum DesignError {
     Air {
         /// The reference.
         reference: f64,
-        /// The duty it takes.
+        /// Duty that holds the reference.
         needed: f64,
-        /// The duty allowed.
+        /// Largest allowed duty.
         allowed: f64,
     },
     /// No pulse train stays bounded in the long run.

@@ -274,9 +274,8 @@ mod tests {
         }
     }
 
-    /// Theory 2.4, the first five seconds: steady blowing is the best of the full
-    /// model (1.00 from 0.5 s on); the averaged fixed-delay one, played raw
-    /// on/off commands, gives 1.10 (found there by adjoint gradients) against 0.89.
+    /// Theory 2.4, the first five seconds: steady blowing is the best of the full model (1.00 from 0.5 s on); the
+    /// averaged fixed-delay model with raw on/off commands reaches 1.10 (by adjoint gradients) against 0.89.
     #[test]
     fn the_first_five_seconds_of_the_papers_models() {
         let horizon = Horizon {

@@ -163,9 +163,9 @@ pub fn margin(model: &Model, law: &Track, noise: f64, seed: u64, planes: bool) -
 /// End of a ray.
 #[derive(Clone, Copy)]
 struct End {
-    /// The errors there, as shares.
+    /// The errors at the end, as shares.
     shares: [f64; 3],
-    /// Whether it is the limit of the search.
+    /// Whether the end is the limit of the search.
     open: bool,
 }
 
@@ -255,7 +255,7 @@ mod tests {
         }
     }
 
-    /// Samples to a tenth of the end of a step, samples from there to half of it, and its end.
+    /// Figures of a step response: samples to 10 % of its final value, samples from 10 to 50 %, and the final value.
     fn step(model: &Model, times: f64) -> [f64; 3] {
         let bench = Player::<f64>::of(model);
         let channels = bench.channels.clone();

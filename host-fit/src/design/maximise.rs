@@ -111,11 +111,11 @@ pub struct Weighed {
 /// The best pulses.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct BestPulses {
-    /// Their mean friction, the lowest with a period 2 % off, y.
+    /// Mean friction of the pulses, the lowest with a period 2 % off, y.
     pub mean: f64,
     /// Share of time with the valve open.
     pub duty: f64,
-    /// Their value, y.
+    /// Value of the pulses, y.
     pub value: f64,
 }
 
@@ -488,7 +488,7 @@ impl TrainSearch {
         all
     }
 
-    /// The train and its neighbours 2 % shorter and longer in a long run.
+    /// Evaluates the train, also with periods 2 % shorter and longer, over a long run.
     fn lasting(&self, train: &Train) -> Option<Lasting> {
         let (judged, after) = self.long_run(train)?;
         let (mut detuned, mut robust_value) = (judged.mean, judged.value);
@@ -602,7 +602,7 @@ mod tests {
         let (pulses, steady) = (weighed.pulses.unwrap(), weighed.steady_value.unwrap());
         assert_eq!(weighed.value, pulses.value.max(steady));
         assert!((pulses.value - (pulses.mean - 0.4 * pulses.duty)).abs() < 1e-9);
-        // Pulses are the optimum exactly if the price is above the one at which they pay.
+        // Pulses are the optimum exactly if the price of air is above the one from which they are better.
         let pays_from = weighed.pulses_pay_from.unwrap();
         assert_eq!(pulses.value > steady, 0.4 > pays_from, "{weighed:?}");
         assert!(optimum.mean_detuned > 0.95 * optimum.mean, "{optimum:?}");

@@ -79,8 +79,8 @@ pub fn possible_flows(
     Ok(flows)
 }
 
-/// Whether an effect is not in the model and would be visible on the records. What only the dead time hides may be there
-/// all the same.
+/// Whether an effect is not in the model and would be visible on the records. An effect that only the dead time hides
+/// may still be present.
 fn can_be_tried(judge: &RecordJudge, spec: &Spec) -> bool {
     let on_off = judge.records().iter().all(|record| record.is_on_off());
     let present = judge
@@ -258,8 +258,8 @@ fn ways(judge: &RecordJudge, spec: &'static Spec) -> Vec<[Vec<f64>; 2]> {
         }
         return ways;
     }
-    // For effects without an amplitude: from the corner of the ranges with the least change of the run to the
-    // start with the largest.
+    // Without an amplitude, the path leads from the corner of the parameter ranges with the smallest change of the run
+    // to the starting values with the largest.
     let change = |parameters: &Vec<f64>| {
         let flow = judge.refitted(&with_effect(judge, spec, parameters));
         flow.map_or(f64::INFINITY, |flow| flow.change)

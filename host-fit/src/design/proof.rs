@@ -398,7 +398,7 @@ fn on_model(law: &Track, bench: &Player<f32>) -> Case {
         ),
     };
     let (case, _) = itself.run(&mut host_law(bench, law), law.reference);
-    // The model may diverge under steady blowing: the target is the measure.
+    // The model may diverge under steady blowing, so the target is the reference.
     Case {
         kept: case.lowest >= RULES.attached * law.reference,
         ..case

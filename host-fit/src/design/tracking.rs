@@ -16,7 +16,7 @@ use serde::Serialize;
 /// Requirements on a tracking law.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TrackRequest {
-    /// The friction to hold: y of the flow for [`track`]; what the sensor shows, its zero included, for
+    /// The friction to hold: y of the flow for [`track`]; the sensor's reading, offset included, for
     /// [`steps::design`](crate::steps::design).
     pub target: f64,
     /// Shortest on time of the valve, s.
@@ -37,7 +37,8 @@ pub struct TrackRequest {
 }
 
 impl TrackRequest {
-    /// Holds `target` with a valve that needs 10 ms either way, or a sample where that is longer, without further limits.
+    /// A request to hold `target` without further limits, with shortest times of the valve of 10 ms, or of a sample if
+    /// that is longer.
     #[must_use]
     pub fn holding(target: f64) -> Self {
         Self {

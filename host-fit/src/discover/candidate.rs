@@ -56,7 +56,7 @@ impl Candidate {
         self.term.entry.place()
     }
 
-    /// Whether the two differ only between pulse length and time since the edge, which are equal during a
+    /// Whether one term depends on the pulse length and the other on the time since the edge: these are equal during a
     /// pulse.
     pub(super) fn is_twin(&self, other: &Self) -> bool {
         let ratio = self.with.judged.rmse() / other.with.judged.rmse();

@@ -259,8 +259,8 @@ impl Finder<'_> {
         (outer, written)
     }
 
-    /// The command that would distinguish `model` (with all terms) from models with an alternative for the
-    /// first ambiguous term.
+    /// The command that would distinguish `model` (with all terms) from models with an equivalent term in place of the
+    /// first ambiguous one.
     pub(super) fn separation(&self, found: &[Found], model: &Model) -> Option<Separation> {
         let judge = self.search.judge;
         let index = found.iter().position(|found| !found.rivals.is_empty())?;

@@ -227,8 +227,8 @@ impl Finder<'_> {
         })
     }
 
-    /// The best of some brief fits, refitted in full. The lags of the base, which had imitated the missing
-    /// term, move back.
+    /// The best of some brief fits, refitted in full. The refit also moves the lags of the base, which had imitated the
+    /// missing term.
     fn finished(&self, tried: Vec<Tried>) -> Vec<Candidate> {
         let judge = self.search.judge;
         let mut rated: Vec<(f64, Tried)> = parallel::some(tried, |tried| {

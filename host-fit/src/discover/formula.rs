@@ -234,8 +234,8 @@ impl Form {
             .collect()
     }
 
-    /// Least-squares parameters for the points of a curve, and the remaining mean square; with `free_level`,
-    /// up to a constant. `None` if the form is not defined there.
+    /// Least-squares parameters for the points of a curve, and the remaining mean square; with `free_level`, up to a
+    /// constant. `None` if the form is not defined at these points.
     pub(super) fn nearest(
         &self,
         x: &[f64],

@@ -39,9 +39,9 @@ pub struct Alike {
 /// Detectable size of a term at a place: rms of its values, from the easiest coordinate to the hardest.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Smallest {
-    /// For the easiest coordinate.
+    /// Detectable size for the easiest coordinate.
     pub from: f64,
-    /// For the hardest coordinate of the easier half.
+    /// Detectable size for the hardest coordinate of the easier half.
     pub to: f64,
     /// The unit.
     pub unit: &'static str,
@@ -108,7 +108,7 @@ pub struct Discovery {
     /// At each place, the signal that would explain the error of the base without the first term. If no term was
     /// found, the base is the best one. `None` if no error remains.
     pub trace: Option<Trace>,
-    /// The command that would distinguish the first ambiguous term from its alternatives.
+    /// The command that would distinguish the first ambiguous term from the terms equivalent to it.
     pub separation: Option<Separation>,
     /// The record-to-record offset of the sensor, if there is one: a term must explain more than this offset
     /// does.

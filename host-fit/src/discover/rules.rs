@@ -18,7 +18,7 @@ rules! {
     most_points: usize = 11, "", "judgement: 1.5 times the derivatives of one run";
     /// Share of the samples beyond the first and the last point.
     beyond: f64 = 0.01, "share of the samples", "judgement";
-    /// Least distance of two points.
+    /// Least distance of a point to the next, relative to its distance from the first point.
     apart: f64 = 0.05, "of the way from the first point", "judgement: rests and times since edges span three decades";
     /// A curve is refitted if its predicted gain is at least this share of the practical margin.
     promised: f64 = 0.5, "share", "judgement: the first-order gain is smaller than the gain after a refit";

@@ -347,7 +347,7 @@ impl Term {
         Some(model)
     }
 
-    /// The model without it.
+    /// The model without the term.
     pub(super) fn taken_from(&self, model: &Model) -> Model {
         let mut model = model.clone();
         let name = self.name();

@@ -13,7 +13,7 @@ use model_core::{Real, pairs};
 pub enum HostEffect<T: Real> {
     /// From `model_core::effects`.
     Catalogue(AnyEffect<T, Ring<T>>),
-    /// From an effect file.
+    /// An effect from an effect file.
     User(UserEffect<T>),
 }
 
@@ -21,9 +21,9 @@ pub enum HostEffect<T: Real> {
 #[derive(Clone, Debug)]
 #[allow(clippy::large_enum_variant, reason = "a handful per model")]
 pub enum HostState<T: Real> {
-    /// Of an effect of the catalogue.
+    /// State of an effect of the catalogue.
     Catalogue(AnyState<T, Ring<T>>),
-    /// Of a user's effect.
+    /// State of a user's effect.
     User(UserState<T>),
 }
 

@@ -107,7 +107,7 @@ pub struct Added {
     pub name: String,
     /// Parameter values in the order and units of the catalogue.
     pub parameters: Vec<f64>,
-    /// The measured channel it uses.
+    /// The measured channel that the effect uses.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub channel: Option<String>,
     /// The reference of that channel, in its unit, or the calibration reading of the sensor, y; see

@@ -21,7 +21,7 @@ pub(super) struct Deviations {
 }
 
 impl Deviations {
-    /// Of samples with these variances, all above 0.
+    /// The standard deviations of samples with these variances, all above 0.
     pub(super) fn of(variance: &[f64]) -> Self {
         Self {
             weights: variance.iter().map(|v| v.sqrt().recip()).collect(),

@@ -1,11 +1,10 @@
 //! The noise model that all likelihoods use.
 //!
-//! The error of record g is r_g = b_g·1 + d_g·t + a_g·f_g + ε_g (theory 4.4), with f_g the free run
-//! of the model. Offset b, drift d and level a are Gaussian random effects per record, marginalised by
-//! Woodbury's identity of rank 3: errors along them are weighted by the record-to-record scatter, other
-//! errors in full. ε is white noise plus first-order coloured noise, in proportion to the standard errors of
-//! the samples. A scalar Kalman filter whitens it; the filter is linear, so errors and derivatives are
-//! whitened alike.
+//! The error of record g is r_g = b_g·1 + d_g·t + a_g·f_g + ε_g (theory 4.4), with f_g the free run of the model.
+//! Offset b, drift d and level a are Gaussian random effects per record, marginalised by Woodbury's identity of rank 3:
+//! errors along them are weighted by the record-to-record scatter, other errors in full. ε is white noise plus
+//! first-order coloured noise, proportional to the standard errors of the samples. A scalar Kalman filter whitens it;
+//! the filter is linear, so errors and derivatives are whitened alike.
 
 mod colour;
 mod estimate;

@@ -154,7 +154,7 @@ fn document(description: &str, width: f64, paint: impl Fn(&mut Canvas) -> f64) -
 }
 
 impl Canvas {
-    /// Whether it is laid out for a phone: what stands side by side elsewhere stands below each other.
+    /// Whether the layout is for a phone: parts that are side by side in the wide layout are below each other.
     pub(super) fn is_narrow(&self) -> bool {
         self.width < 500.0
     }

@@ -35,7 +35,7 @@ pub struct Ladder<'a> {
     pub steps: &'a [LadderStep<'a>],
     /// The validation records; empty to show them together only.
     pub records: &'a [LadderRecord<'a>],
-    /// RMSE that the noise alone causes, all records together.
+    /// Noise level, rms over all records together.
     pub noise_rmse: Option<f64>,
 }
 

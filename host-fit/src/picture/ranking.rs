@@ -36,7 +36,7 @@ pub struct Ranking<'a> {
     pub candidates: &'a [Candidate<'a>],
     /// RMSE of the model that the candidates were added to.
     pub base_rmse: Option<f64>,
-    /// RMSE that the noise alone causes.
+    /// Noise level, rms.
     pub noise_rmse: Option<f64>,
 }
 
@@ -93,7 +93,7 @@ pub fn ranking(plot: &Ranking<'_>) -> Picture {
         let stacked = canvas.is_narrow();
         let names = order
             .iter()
-            // Any of them may be bold.
+            // Every name may be bold.
             .map(|c| BOLD * text_width(c.name, SIZE))
             .fold(60.0, f64::max);
         let notes = order

@@ -17,7 +17,7 @@ pub struct FailureBin {
     pub to: f64,
     /// RMS of the free-run residual in the bin, unit of y; NaN for an empty bin.
     pub rmse: f64,
-    /// RMS that the noise alone causes there; NaN when unknown.
+    /// RMS of the noise in the bin; NaN if unknown.
     pub noise_rmse: f64,
 }
 

@@ -34,7 +34,7 @@ struct Noise {
 }
 
 impl Noise {
-    /// Estimates it from the `deviations` from the mean of each series.
+    /// Estimates the noise from the `deviations` from the mean of each series.
     fn of(deviations: &[Vec<f64>]) -> Self {
         let samples: usize = deviations.iter().map(Vec::len).sum();
         let squares: f64 = deviations.iter().flatten().map(|d| d * d).sum();
@@ -53,7 +53,7 @@ impl Noise {
 }
 
 impl<'a> Rests<'a> {
-    /// Finds those of `records` that rest under a command of `off`; `None` if none does.
+    /// The rests of `records` under a command of `off`; `None` if none does.
     fn of(records: &'a [Record], beginnings: &[Beginning], off: f64) -> Option<Self> {
         let pairs = records.iter().zip(beginnings);
         let rests: Vec<(&Record, &[f64])> = pairs
@@ -82,8 +82,9 @@ impl<'a> Rests<'a> {
         self.rests.iter().map(|(_, y)| mean(y)).collect()
     }
 
-    /// Whether the levels of the rests are nearer to those of whole records, around a second-order response with one
-    /// level, than a common level is. Records with y_sd, of flows as a rule, have no such response.
+    /// Whether the whole records confirm the levels of the rests: the mean residuals of a second-order response with
+    /// one common level are nearer to these levels than to a common level. Records with y_sd are usually of flows,
+    /// which have no such response, and are not tested.
     fn agree_with_responses(&self) -> bool {
         let records = || self.rests.iter().map(|(record, _)| *record);
         if records().any(|record| record.y_sd.is_some()) {
@@ -155,7 +156,7 @@ impl NoiseAtRest {
             || left().powi(2),
             |sums| sums.iter().sum::<f64>() / samples as f64,
         );
-        // Estimates it for a variance of this many samples.
+        // Relative standard error of a variance of this many samples.
         let error = (2.0 / samples as f64).sqrt();
         let slower = (1.0 - RULES.slower_by_chance * error) * whole - rests.noise.within;
         Self {
@@ -549,7 +550,7 @@ mod tests {
         assert!(!moves(0.02));
     }
 
-    /// Levels of short rests that differ by chance: the whole records show one level.
+    /// Levels of short rests that differ accidentally: the whole records show one level.
     #[test]
     fn levels_of_rests_that_whole_records_contradict_are_no_zeros() {
         let short = Beginning {

@@ -14,8 +14,8 @@ struct Parabola {
 }
 
 impl Parabola {
-    /// At sample `at` of `y`, over the `2·half + 1` samples around it or, near the ends, next to it; `None` if
-    /// there are fewer samples.
+    /// The parabola at sample `at` of `y`, over the `2·half + 1` samples around it (near the ends of `y`, the first or
+    /// last ones); `None` if there are fewer samples.
     fn of(y: &[f64], at: usize, half: usize) -> Option<Self> {
         let width = 2 * half + 1;
         let from = at.saturating_sub(half).min(y.len().checked_sub(width)?);
@@ -52,7 +52,7 @@ pub(super) fn smoothed(y: &[f64], at: usize, half: usize) -> f64 {
 /// The best description of the slow part of a residual.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Slow {
-    /// It is noise: 0.
+    /// The residual is noise, and its slow part is 0.
     Nothing,
     /// A parabola over this many samples on both sides; 0 is the residual itself.
     Parabola(usize),

@@ -315,8 +315,8 @@ impl Learned {
 mod tests {
     use super::*;
 
-    /// 2.7 standard errors of the sum: more than the 2.5 of the normal distribution, less than Student's quantile
-    /// for ten blocks, 3.1.
+    /// A sum of 2.7 standard errors exceeds the limit by the normal distribution, 2.5, but not Student's for ten
+    /// blocks, 3.1.
     #[test]
     fn few_blocks_have_to_say_more() {
         let gains = |n: usize| -> Vec<f64> {

@@ -42,9 +42,9 @@ pub struct Where {
     pub worst_from: f64,
     /// Upper end of that interval; equal to the lower end for a single pulse of a cycle.
     pub worst_to: f64,
-    /// Root mean square of the error there, in y.
+    /// Root mean square of the error in that interval, in y.
     pub worst_rmse: f64,
-    /// Mean error y − y_sim there, in y.
+    /// Mean error y − y_sim in that interval, in y.
     #[serde(skip)]
     pub bias: f64,
     /// How the error depends on the coordinate; none if it does not.

@@ -89,7 +89,7 @@ rules! {
     most_said: usize = 3, "", "judgement";
     /// A mean error is reported if it is at least this share of the rms error.
     worth_saying_bias: f64 = 0.3, "share of the rms error", "judgement: 9 % of the error energy";
-    /// A mean error in the worst interval is reported if it is at least this share of the error there.
+    /// A mean error in the worst interval is reported if it is at least this share of the rms error in the interval.
     worth_saying_worst_bias: f64 = 0.5, "share of the rms error", "judgement: a quarter of the error energy in \
          the interval";
     /// An interval is reported if it contains this many times its share of the samples.

@@ -15,8 +15,8 @@ struct Piece {
     noise: f64,
 }
 
-/// Difference between the spectrum of the error above the noise and that of y: an error with the spectrum of
-/// y is at no particular frequency.
+/// How the error above the noise differs in its spectrum from y. An error with the spectrum of y is at no particular
+/// frequency.
 pub(super) fn by_frequency(errors: &Errors, excess: f64) -> Option<Where> {
     let length = ((RULES.piece_s / errors.period_s) as usize).clamp(64, 4096);
     let length = 1 << length.ilog2();

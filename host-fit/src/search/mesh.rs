@@ -110,13 +110,13 @@ impl Mesh {
         self.axes.iter().all(|a| a.frame_size() == 1)
     }
 
-    /// After a failed poll: smaller frames.
+    /// Makes the frames smaller, after a failed poll.
     pub fn refine(&mut self) {
         self.axes.iter_mut().for_each(MeshAxis::refine);
     }
 
-    /// After a success along `step` (ticks): larger frames for the variables that
-    /// took part in it, so that the frame takes the shape of the valley.
+    /// Enlarges the frames, after a success along `step` (ticks), for the variables that moved: the frame then takes
+    /// the shape of the valley.
     pub fn enlarge(&mut self, step: &[i64]) {
         for (axis, &moved) in self.axes.iter_mut().zip(step) {
             if moved.unsigned_abs() as f64 > RULES.anisotropy * axis.frame_size() as f64 {

@@ -84,8 +84,8 @@ impl<P: Problem> SearchStep<P> for Speculative {
     }
 }
 
-/// From the incumbent, the end point of a [`Settle`] and, if it is better, the success; adds to the number of
-/// points screened.
+/// The improvement of a [`Settle`]: from the incumbent to an end point and, if it is better, the success. It also
+/// counts the points screened.
 pub type Improve<P> = fn(
     &mut Evaluator<'_, P>,
     &Around<'_>,

@@ -74,7 +74,7 @@ impl Answer {
         self
     }
 
-    /// With the command that follows.
+    /// Sets the next command.
     #[must_use]
     pub fn next(mut self, command: impl Into<String>) -> Self {
         self.next = command.into();
@@ -114,8 +114,8 @@ impl Answer {
             .collect()
     }
 
-    /// As lines for a terminal: the verdict, then each part and each note, wrapped at 100 columns. The command is never
-    /// wrapped, so that it can be copied.
+    /// The answer as lines for a terminal: the verdict, then each part and each note, wrapped at 100 columns. The
+    /// command is never wrapped, so that it can be copied.
     #[must_use]
     pub fn words(&self) -> String {
         let mut text = self.verdict.clone();
@@ -136,7 +136,7 @@ impl Answer {
         text
     }
 
-    /// As consecutive sentences, for a JSON document.
+    /// The answer as consecutive sentences, for a JSON document.
     #[must_use]
     pub fn sentence(&self) -> String {
         let mut text = format!("{}.", self.verdict);

@@ -18,7 +18,7 @@ pub struct EffectEntry {
     pub equation: &'static str,
     /// The measured channel that it needs, if any.
     pub channel: Option<&'static str>,
-    /// Where it is described.
+    /// Literature source.
     pub source: &'static str,
     /// The behaviour of the records that it describes.
     pub shows: Option<String>,

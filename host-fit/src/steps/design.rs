@@ -185,7 +185,7 @@ impl Optimum {
     }
 }
 
-/// Designs the law that `request` asks for and puts it into the model.
+/// Designs the law that `request` specifies and puts it into the model.
 ///
 /// ```
 /// use host_fit::design::TrackRequest;

@@ -42,7 +42,7 @@ books!(
     design
 );
 
-/// The change of a rule that `NAME=VALUE` asks for.
+/// The change of a rule that `NAME=VALUE` specifies.
 ///
 /// # Errors
 /// [`ChangeError`].

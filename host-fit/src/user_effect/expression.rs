@@ -23,7 +23,7 @@ const SUBSET: &str = "allowed are numbers, names, + - * /, comparisons, && || !,
 pub(super) struct Fault {
     /// From 1.
     pub(super) line: usize,
-    /// From 1, in characters.
+    /// Column, in characters from 1.
     pub(super) column: usize,
     pub(super) problem: String,
 }

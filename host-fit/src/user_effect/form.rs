@@ -229,7 +229,7 @@ mod tests {
         let parameters = middle::<T>(spec);
         let own = AnyTransport::new(spec.name, &parameters, &setting()).expect("a law");
         let form = form(spec.name).unwrap_or_else(|| panic!("{} has no form", spec.name));
-        // As effects of the jets, whose own signal is the input.
+        // Forms are run as effects of the jets, whose own signal is the input.
         let delay = UserEffect::of(&form.value, Place::Jet, &parameters, &setting());
         let command = form.command.as_ref();
         let command = command.map(|c| UserEffect::of(c, Place::Jet, &parameters, &setting()));

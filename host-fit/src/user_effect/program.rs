@@ -184,7 +184,7 @@ pub(crate) struct Line {
     pub(crate) to: f64,
     pub(crate) steepness: Register,
     pub(crate) rise: Register,
-    /// The sum including it.
+    /// The sum up to and including this line.
     pub(crate) value: Register,
 }
 

@@ -1,6 +1,6 @@
 //! Budgets of valve and compressor: switches and air per time.
 //!
-//! Both are stores with a constant inflow, in whole numbers, so they have neither drift nor rounding errors.
+//! Both are integer counters that are refilled at a constant rate, so they have neither drift nor rounding errors.
 
 use crate::control::hold::{Hold, HoldTimes};
 
@@ -34,9 +34,9 @@ pub struct Budget {
 /// State of the budgets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Purse {
-    /// In samples: a switch costs `samples_per_switch`.
+    /// Store of switches, in samples: a switch costs `samples_per_switch`.
     switches: u32,
-    /// In thousandths of a sample of blowing.
+    /// Store of air, in thousandths of a sample of blowing.
     air: u32,
 }
 

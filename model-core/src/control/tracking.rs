@@ -552,7 +552,8 @@ mod tests {
         assert!(switches <= 400 + 12, "{switches}");
     }
 
-    /// Changed in operation: the share of time with the valve open falls to the new budget, and nonsense changes nothing.
+    /// Changed in operation: the share of time with the valve open falls to the new budget, and invalid values change
+    /// nothing.
     #[test]
     fn the_air_budget_changes_in_operation() {
         let mut law = law::<f64>(0.8, 10);

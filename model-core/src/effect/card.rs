@@ -236,7 +236,7 @@ impl Needs {
 /// Conversion of all parameters of an effect to one number with its unit, for reports.
 pub type Said = fn(&[f64]) -> (f64, &'static str);
 
-/// The parameter at whose zero an effect vanishes, with its wording.
+/// The parameter whose value 0 removes the effect, with its wording.
 #[derive(Clone, Copy, Debug)]
 pub struct Amplitude {
     /// The parameter's name.
@@ -333,7 +333,7 @@ pub struct Spec {
     pub name: &'static str,
     /// Rust path of the effect below `model_core::effects`, for generated code.
     pub rust: &'static str,
-    /// Its Rust type there.
+    /// Rust type of the effect in that module.
     pub rust_type: RustType,
     /// Where it acts.
     pub place: Place,

@@ -61,7 +61,7 @@ impl Unit {
         known.map_or("-", |(_, symbol)| symbol)
     }
 
-    /// The unit that `symbol` says.
+    /// The unit with this symbol in files.
     #[must_use]
     pub fn of(symbol: &'static str) -> Self {
         let known = SYMBOLS.iter().find(|(_, known)| *known == symbol);

@@ -10,9 +10,9 @@ use crate::real::Real;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Shedding<T> {
     gain: T,
-    /// Decay over a sample.
+    /// Factor by which a vortex decays over a sample.
     kept: T,
-    /// Mean over a sample of a vortex created at its start.
+    /// Mean, over a sample, of a vortex of strength 1 created at the start of the sample.
     mean: T,
 }
 

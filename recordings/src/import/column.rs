@@ -86,7 +86,7 @@ impl Column {
         self.blanks.len() == self.values.len()
     }
 
-    /// The column as a variable; `lines` are those of the rows. If a cell is unreadable, the first such cell.
+    /// The column as a variable, or its first unreadable cell; `lines` are the lines of the rows.
     pub(super) fn variable(
         mut self,
         name: String,

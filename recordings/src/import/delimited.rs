@@ -91,7 +91,7 @@ fn bare(cell: &str) -> &str {
     inner.map_or(cell, str::trim)
 }
 
-/// Joins cells that blanks have split: a date and its clock time, that and AM or PM, a number and its unit.
+/// Joins cells that blanks have split: a date and its clock time, a clock time and AM or PM, a number and its unit.
 fn merge<'a>(line: &'a str, cells: &mut Vec<&'a str>) {
     // Cells up to `kept` are finished.
     let mut kept = 0;
@@ -143,7 +143,7 @@ impl Rows {
     pub(super) fn find(lines: &[&str]) -> Option<Self> {
         let found = Self::first_of(lines, Likeness::Whole);
         let mut rows = found.or_else(|| Self::first_of(lines, Likeness::Partial))?;
-        // Rows with text may stand above the first one without.
+        // Rows with text may be above the first row without text.
         let mut cells = Vec::new();
         for at in (0..rows.first).rev() {
             let line = lines.get(at).copied().unwrap_or_default();
@@ -239,7 +239,7 @@ impl Rows {
                     *first = format!("{first} {second}");
                 }
             }
-            // Programs number the rows without a column name.
+            // Some programs write row numbers without a column name.
             if cells.len() + 1 == width && cells.iter().all(|c| is_name(c)) {
                 cells.insert(0, String::new());
             }

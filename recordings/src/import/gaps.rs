@@ -15,7 +15,7 @@ pub(super) struct Gaps {
     pub(super) most_s: Option<f64>,
     /// Sampling period, s.
     pub(super) period_s: f64,
-    /// The row of each sample in the file; a lost row has that of the row after it.
+    /// The row of each sample in the file; a sample of a lost row has the next row.
     pub(super) rows: Vec<usize>,
 }
 
@@ -28,7 +28,7 @@ pub(super) enum Filling {
     Held,
 }
 
-/// The times with those of lost rows, and the row of each in the file; `None` if no row is lost.
+/// The times, including those of lost rows, and the row of each in the file; `None` if no row is lost.
 pub(super) fn completed(
     times: &PrintedTimes,
     stated: Option<Stated>,
@@ -179,7 +179,7 @@ fn listed(rows: &[usize], variable: &Variable, place: Place) -> String {
     format!("{kind}{plural} {}{more}", numbers.join(", "))
 }
 
-/// Whether a gap is longer than the longest that is filled; the last bits do not count.
+/// Whether a gap is longer than the longest that is filled; rounding errors do not count.
 fn is_longer(length_s: f64, most_s: f64) -> bool {
     length_s > most_s * (1.0 + 1e-6)
 }

@@ -20,7 +20,7 @@ pub(super) struct Timing<'a> {
     pub(super) t0: f64,
     /// Sampling period, s.
     pub(super) period_s: f64,
-    /// The row of each sample in the file; a lost row has that of the row after it.
+    /// The row of each sample in the file; a sample of a lost row has the next row.
     pub(super) rows: Vec<usize>,
 }
 

@@ -111,7 +111,8 @@ const STEPS: &[Step] = &[
                 .env("RUSTDOCFLAGS", "-Dwarnings"))
         },
     },
-    // The emulated board, one step after the other: the longest chain, so it starts before what can run beside it.
+    // The emulated board, one step after the other: the longest chain, so it starts before steps that can run at the
+    // same time.
     Step {
         name: "faults",
         after: &[SET_UP, BUILD],
@@ -132,7 +133,7 @@ const STEPS: &[Step] = &[
         room: Some(Room::Firmware),
         run: || crate::periods::periods(&[]),
     },
-    // The whole circle, unattended.
+    // The complete workflow on the simulated rig, without a user.
     Step {
         name: "rig-day",
         after: &[SET_UP, BUILD],

@@ -77,7 +77,7 @@ const BRIEF: Form = Form {
         "design.margin-bisections=2",
     ],
     watched: ["20", "8"],
-    // Most of the error is the ripple of the shortest pulses, which so short a watch measures to 3 %.
+    // Most of the error is the ripple of the shortest pulses, which a watch of this length measures to 3 %.
     law: 1.06,
 };
 /// Rest at the end of a shortened command, ms; no bundled command has an edge shortly before it.

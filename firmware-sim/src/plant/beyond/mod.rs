@@ -94,8 +94,8 @@ impl Truth {
     }
 }
 
-/// Ratio of an exponential memory's time constant to a window with nearly the same information: with the
-/// rigs' commands, a curve over one explains 84–94 % of a curve over the other, most at this ratio.
+/// Ratio of the time constant of an exponential memory to the length of a window with nearly the same information. With
+/// the rigs' commands, a curve over one explains 84–94 % of a curve over the other; the share is largest at this ratio.
 const MEMORY_PER_WINDOW: f64 = 0.6;
 
 /// Interface of each file in this folder.

@@ -473,7 +473,7 @@ impl Effect {
     }
 }
 
-/// Whether two effects, by similar effect and place, need the same part of a rig.
+/// Whether two effects, each stated as its similar effect of the catalogue and its place, need the same part of a rig.
 pub(crate) fn exclude(a: (&str, Place), b: (&str, Place)) -> bool {
     a.0 == b.0 || [a.1, b.1] == [Place::Transport; 2]
 }

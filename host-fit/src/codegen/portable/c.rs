@@ -357,7 +357,7 @@ fn constants(sheet: &Sheet<'_>, c: &C) -> String {
     text
 }
 
-/// In parentheses if its sign could follow another sign.
+/// A number, in parentheses if its sign could follow another sign.
 fn signed(c: &C, value: f64) -> String {
     let number = c.number(value);
     if number.starts_with('-') {
@@ -501,7 +501,7 @@ static void slide(struct model *s, real entering, real leaving)
 }
 ";
 
-/// y_{k+1} from what arrives.
+/// The function that computes y_{k+1} from the arriving jets.
 fn recursion(sheet: &Sheet<'_>, w: &mut String) {
     if sheet.graded() {
         if sheet.model.grading == Grading::Switched {

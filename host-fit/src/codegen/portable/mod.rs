@@ -15,7 +15,7 @@ use super::{CodegenError, check};
 use crate::model::Model;
 use sheet::Sheet;
 
-/// In which numbers C computes.
+/// Precision of the numbers in C.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Precision {
     /// `float`, as the boards do.

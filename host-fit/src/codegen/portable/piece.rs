@@ -63,7 +63,7 @@ pub(super) enum Tapped<'a> {
         whole: usize,
         fraction: f64,
     },
-    /// So many samples back, an expression.
+    /// A varying number of samples back, as an expression.
     Varying(&'a str),
 }
 
@@ -84,7 +84,7 @@ pub(super) struct Piece {
     pub(super) program: &'static Program,
     /// Prefix of the names of constants, for example `FX1`; states have it in lower case.
     prefix: String,
-    /// Before the names of parameters.
+    /// Prefix of the names of parameters.
     owner: String,
     parameters: Vec<String>,
     channel: usize,

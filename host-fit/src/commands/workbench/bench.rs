@@ -47,14 +47,14 @@ pub(super) struct Compared {
 /// A step with its resulting model.
 pub(super) struct Made<'a> {
     pub(super) model: &'a Model,
-    /// The model that it was made from.
+    /// The model from which the step started.
     pub(super) from: Option<u32>,
     /// The step in a few words.
     pub(super) step: String,
     /// The step as a command.
     pub(super) command: String,
-    /// The model that was current when the step began, if the page is to go on to the new one: it does unless the user has
-    /// gone elsewhere meanwhile.
+    /// The model that was current when the step began, if the page should then show the new model. The page stays if
+    /// the user has chosen another model meanwhile.
     pub(super) leaves: Option<Option<u32>>,
 }
 
@@ -127,7 +127,8 @@ impl ModelBench {
         self.change_data(command, |folder| Ok(found.imported.save(folder)?))
     }
 
-    /// Makes a folder that `save` writes the project's data set. Models of another one are put aside with their data.
+    /// Replaces the project's data set by the one that `save` writes. Models of the previous data set are moved aside
+    /// with their data.
     fn change_data(
         &self,
         command: &str,
@@ -170,7 +171,7 @@ impl ModelBench {
         Ok(json!({}))
     }
 
-    /// Chooses the validation records; `names` are theirs, one a line.
+    /// Chooses the validation records; `names` has one name per line.
     fn validate_on(&self, names: &str) -> Result<Value, Refusal> {
         let mut set = self.data()?.set.clone();
         let chosen: Vec<&str> = names.lines().collect();
@@ -246,7 +247,7 @@ impl ModelBench {
         }
     }
 
-    /// Clears it for the next search.
+    /// Clears the stored model before the next search.
     pub(super) fn forget_best(&self) {
         *lock(&self.best) = None;
     }

@@ -37,7 +37,7 @@ impl Command {
         }
     }
 
-    /// Its options without those that name files.
+    /// The command's options without those that name files.
     fn options(self) -> &'static [&'static str] {
         match self {
             Self::Identify => &[

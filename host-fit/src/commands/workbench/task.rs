@@ -194,7 +194,7 @@ fn loop_of(model: &Path) -> PathBuf {
     model.with_file_name(format!("{}.csv", stem.replace("model", "loop")))
 }
 
-/// Stores what a step says of the model that it made.
+/// Stores the answer of a step with the model that it made.
 fn told_of(bench: &ModelBench, id: u32, told: &Value) -> Result<(), Refusal> {
     write(&bench.beside("made", id, "json")?, &told.to_string())
 }

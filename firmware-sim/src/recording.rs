@@ -70,7 +70,7 @@ pub(crate) struct Session<'a> {
     /// Whether the free stream varies and is recorded as the channel `u_inf`.
     pub(crate) free_stream: bool,
     pub(crate) units: Units,
-    /// Does not contain the hidden effects.
+    /// Title of the data set, which does not name the hidden effects.
     pub(crate) title: String,
     pub(crate) seed: u64,
 }

@@ -287,7 +287,7 @@ mod tests {
             let u: Vec<f64> = (0..2500)
                 .map(|k| f64::from(u8::from(k / half % 2 == 1)))
                 .collect();
-            // The size of y limits a free run.
+            // y = 1 sets the divergence limit of the free run, which is relative to y.
             let y = vec![1.0; u.len()];
             let mut record = Record::new(&format!("r{each}"), Use::Identify, 0.001, u, y);
             let run = with_pickup(&base(), PICKUP)

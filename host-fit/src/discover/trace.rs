@@ -109,7 +109,8 @@ struct Explained {
     /// Variance per independent error.
     variance: f64,
     strength: f64,
-    /// Posterior precision (Cholesky factor) of the model's own parameters given w, and their changes.
+    /// Posterior precision of the model's own parameters given w, as a Cholesky factor, and the changes of these
+    /// parameters.
     own: Cholesky,
     change: Vec<f64>,
 }

@@ -126,7 +126,7 @@ impl Command {
         self.map(|u| if turned { -size * u } else { size * u })
     }
 
-    /// This sequence with `level` applied to every level.
+    /// The sequence with `level` applied to every level.
     pub fn map(mut self, level: impl Fn(f64) -> f64) -> Self {
         for u in &mut self.levels {
             *u = level(*u);

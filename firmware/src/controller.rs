@@ -26,7 +26,7 @@ pub enum Mode {
 /// Constants of the rig.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
-    /// From counts to y.
+    /// Conversion from counts to y.
     pub calibration: Calibration,
     /// Limits of a healthy sensor.
     pub range: Range,

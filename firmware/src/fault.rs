@@ -41,7 +41,7 @@ impl Fault {
         Self::Setting,
     ];
 
-    /// Its name in the status line.
+    /// Name of the fault in the status line.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {

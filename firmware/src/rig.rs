@@ -25,7 +25,7 @@ pub struct Rig<L, S, C, V, A> {
     clock: C,
     /// Opens the valves when high.
     valve: V,
-    /// On while law or command controls the valve.
+    /// A lamp: on while law or command controls the valve.
     lamp: A,
     last: u32,
 }

@@ -50,7 +50,7 @@ pub enum ExcitationError {
     ConstantInput {
         /// The first identify record.
         place: Box<FilePlace>,
-        /// Its command.
+        /// Command throughout the record.
         level: f64,
     },
     /// y never changes.
@@ -70,7 +70,7 @@ pub enum ExcitationError {
     TooShort {
         /// The longest identify record.
         place: Box<FilePlace>,
-        /// Its samples.
+        /// Number of samples in that record.
         longest: usize,
         /// The longest lag asked for.
         max_lag: usize,
@@ -98,7 +98,7 @@ pub struct RecordExcitation {
     pub samples: usize,
     /// Off → on.
     pub rising_edges: usize,
-    /// On → off.
+    /// Number of edges from on to off.
     pub falling_edges: usize,
     /// Shortest and longest time on between two edges, samples.
     pub on_times: Option<(usize, usize)>,

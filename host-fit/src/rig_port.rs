@@ -26,10 +26,10 @@ pub(crate) struct PortArgs {
     /// With `--port qemu`: an effect of the simulated rig; repeatable.
     #[arg(long, value_name = "EFFECT")]
     rig_effect: Vec<String>,
-    /// With `--port qemu`: seed of the simulated rig.
+    /// Seed of the simulated rig, for `--port qemu`.
     #[arg(long, value_name = "SEED", default_value_t = 1)]
     rig_seed: u64,
-    /// With `--port qemu`: seed of the noise.
+    /// Seed of the noise, for `--port qemu`.
     #[arg(long, value_name = "SEED", default_value_t = 1)]
     noise_seed: u64,
 }

@@ -49,7 +49,7 @@ pub enum SimulateError {
         record: String,
         /// First sample beyond the divergence limit.
         sample: usize,
-        /// Its time, s.
+        /// Time of the sample, s.
         time: f64,
     },
 }

@@ -13,7 +13,7 @@ use core::marker::PhantomData;
 pub trait Constants<T: Real> {
     /// Structure, coefficients and delay law; its effects are not used.
     type Base: Parts<T> + 'static;
-    /// Their values.
+    /// Values of the structure, the coefficients and the delay law.
     const BASE: &'static Self::Base;
 }
 
@@ -26,7 +26,7 @@ pub struct Frozen<C, E = ()> {
 }
 
 impl<C, E> Frozen<C, E> {
-    /// With `effects`, prepared.
+    /// The model with its `effects` prepared.
     #[must_use]
     pub const fn new(effects: E) -> Self {
         Self {

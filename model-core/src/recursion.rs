@@ -27,7 +27,7 @@ impl LagConvention {
 }
 
 /// Response of the flow to jets between off and full strength, as produced by valves, plenums and vortices.
-/// For on/off jets all are equal.
+/// For on/off jets all gradings are equal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Grading {
     /// Eq. (3) with j instead of u: drive and rate are both proportional to the jet.

@@ -8,7 +8,7 @@ use crate::model::{Input, Parts, StateOf, step};
 pub struct Crc32(u32);
 
 impl Crc32 {
-    /// Of nothing yet.
+    /// Checksum of no data.
     #[must_use]
     pub const fn new() -> Self {
         Self(u32::MAX)

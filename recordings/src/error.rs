@@ -236,7 +236,7 @@ pub enum DataProblem {
     TimeBackward {
         /// The previous row's time.
         before: f64,
-        /// This row's time.
+        /// Time of this row.
         time: f64,
     },
     /// Samples are missing.
@@ -283,7 +283,7 @@ pub enum DataProblem {
              set has one period: import the records into separate data sets, or resample one of them"
     )]
     PeriodsDiffer {
-        /// Of this record.
+        /// Sampling period of this record, s.
         found: f64,
         /// Sampling period of the first record, s.
         other: f64,

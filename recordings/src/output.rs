@@ -258,7 +258,7 @@ mod swap {
         }
         fs::set_permissions(new, fs::metadata(old)?.permissions())?;
         exchange(new, old)?;
-        // Files added in between.
+        // Files that another program added meanwhile are kept.
         for entry in fs::read_dir(new)?.flatten() {
             let place = old.join(entry.file_name());
             if !place.exists() {

@@ -126,7 +126,7 @@ impl Record {
         self.u.len()
     }
 
-    /// Its memory in bytes.
+    /// Memory of the record, bytes.
     pub(crate) fn bytes(&self) -> u64 {
         let columns = self.columns().count() as u64;
         (columns + 2) * 8 * self.len() as u64

@@ -10,11 +10,11 @@ use thiserror::Error;
 pub struct Rule {
     /// Name of the rule, with dashes for underscores.
     pub name: String,
-    /// Its value.
+    /// Value of the rule.
     pub value: Value,
     /// Unit of the value; empty for a pure number.
     pub unit: &'static str,
-    /// Its meaning.
+    /// Meaning of the rule.
     pub meaning: String,
     /// Origin of the value: the data it was tuned on, the test that covers it, or a convention.
     pub calibrated: &'static str,
@@ -401,7 +401,7 @@ mod tests {
     use super::{Change, ChangeError, Value};
 
     rules! {
-        /// For the test.
+        /// Rules of the test.
         pub struct Rules in "residual";
 
         /// A number.

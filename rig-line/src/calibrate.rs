@@ -47,7 +47,7 @@ const STEADY: (f64, f64) = (4.0, 1000.0);
 /// Waiting times of a calibration, s.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Times {
-    /// For a steady flow.
+    /// Waiting time for a steady flow.
     steady: f64,
     /// Time between two pulses for the flow to settle.
     rest: f64,
@@ -76,9 +76,9 @@ const RAIL: f64 = 8.0;
 /// The measured channel of a rig, stated by the user.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ChannelSaid {
-    /// Its name.
+    /// Name of the output.
     pub name: String,
-    /// Its unit.
+    /// Unit of the output.
     pub unit: String,
     /// Counts at 0.
     pub zero_counts: f64,

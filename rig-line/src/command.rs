@@ -9,7 +9,7 @@ use crate::error::LineError;
 /// An on/off command.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Command {
-    /// Its origin, for messages and files.
+    /// Origin of the command, for messages and files.
     pub name: String,
     /// Sampling period, s.
     pub sample_period_s: f64,
@@ -72,7 +72,7 @@ impl Command {
         self
     }
 
-    /// Its length, samples.
+    /// Length of the command, samples.
     #[must_use]
     pub fn samples(&self) -> u64 {
         self.runs.iter().map(|run| u64::from(*run)).sum()

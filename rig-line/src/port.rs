@@ -111,7 +111,7 @@ impl Port {
         }
     }
 
-    /// This line with transmission errors.
+    /// The line with transmission errors.
     #[must_use]
     pub fn with_faults(self, bad: Bad) -> Self {
         Self {

@@ -66,9 +66,9 @@ pub struct ValveEntry {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ChannelEntry {
-    /// Its name in recordings and models.
+    /// Name of the channel in recordings and models.
     pub name: String,
-    /// Its unit.
+    /// Unit of the channel.
     pub unit: String,
     /// Counts of 0.
     pub zero_counts: f64,

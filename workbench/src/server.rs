@@ -44,7 +44,7 @@ impl<E: std::error::Error> From<E> for Refusal {
 /// A file to be saved by the browser.
 #[derive(Debug, Clone)]
 pub struct Download {
-    /// Its name.
+    /// Name of the file.
     pub name: String,
     /// Media type, for example `text/html`.
     pub kind: &'static str,

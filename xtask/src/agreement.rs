@@ -5,6 +5,6 @@ use crate::shell::{run, scenario};
 
 pub(crate) const TASK: Task = Task {
     name: "agreement",
-    does: "every model, effect and law in C, Python and Octave beside the host, as a table; --all: none may be missing; --in-turn: one kind of graded commands an effect; --pace: seconds of 10^6 samples",
+    does: "compares every model, effect and law in C, Python and Octave with the host, as a table; --all: fails if a language is missing; --in-turn: one kind of graded command for each effect; --pace: prints the time of 10^6 samples",
     run: |arguments| run(scenario("agreement").args(arguments)),
 };

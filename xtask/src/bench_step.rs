@@ -11,7 +11,7 @@ use std::process::Stdio;
 
 pub(crate) const TASK: Task = Task {
     name: "bench-step",
-    does: "instructions of a model step in model-core, in hand-written C (gcc -O3, newlib) and in exported C, under QEMU",
+    does: "counts the instructions of a model step in model-core, in hand-written C (gcc -O3, newlib) and in exported C, under QEMU",
     run: bench_step,
 };
 

@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 
 pub(crate) const TASK: Task = Task {
     name: "faults",
-    does: "fault injection under QEMU: each fault closes the valve, is latched and logged; faults on the line; \
+    does: "injects faults under QEMU, also on the line: each must close the valve, be latched and be logged; \
          --model FILE",
     run: faults,
 };

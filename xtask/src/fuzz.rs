@@ -7,8 +7,8 @@ use crate::shell::{run, scenario};
 
 pub(crate) const TASK: Task = Task {
     name: "fuzz",
-    does: "mutated files, frames and texts for every reader: `--minutes N`, shared by the targets; with their \
-         names only those",
+    does: "gives mutated files, frames and texts to every reader; --minutes N: time for all readers together; \
+         NAMES: only these readers",
     run: |arguments| run(scenario("fuzz").args(arguments)),
 };
 

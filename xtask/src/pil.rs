@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 
 pub(crate) const TASK: Task = Task {
     name: "pil",
-    does: "firmware and plant in lockstep, bit for bit; --model FILE, --periods S,S, --case NAME, --serial DEVICE, --steps N, --lose N",
+    does: "compares firmware and plant in lockstep with the host, bit for bit; --model FILE, --periods S,S, --case NAME, --serial DEVICE, --steps N, --lose N",
     run: |arguments| pil(arguments).map(|_| ()),
 };
 

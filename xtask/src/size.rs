@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 
 pub(crate) const TASK: Task = Task {
     name: "size",
-    does: "use of the flash by crate and by symbol: --board nucleo-f446re|qemu-mps2, --model FILE",
+    does: "prints the use of the flash by crate and by symbol: --board nucleo-f446re|qemu-mps2, --model FILE",
     run: size,
 };
 

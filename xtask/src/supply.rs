@@ -13,7 +13,7 @@ use crate::shell::root;
 
 pub(crate) const TASK: Task = Task {
     name: "supply",
-    does: "licences, sources and versions of the dependencies, against deny.toml",
+    does: "compares licences, sources and versions of the dependencies with deny.toml",
     run: |_| supply(),
 };
 

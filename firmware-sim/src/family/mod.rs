@@ -206,7 +206,7 @@ impl RigPlan {
         }
     }
 
-    /// This rig recorded in other units.
+    /// The rig recorded in other units.
     #[must_use]
     pub fn in_units(mut self, units: Units) -> Self {
         self.units = units;

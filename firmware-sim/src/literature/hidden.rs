@@ -12,7 +12,7 @@ use std::f64::consts::E;
 /// A hidden effect with its parameters and its state.
 #[derive(Clone, Debug)]
 pub struct Hidden {
-    /// Its name in the catalogue.
+    /// Name of the effect in the catalogue.
     pub name: &'static str,
     /// Parameters as the catalogue's card names them, in SI units.
     pub parameters: Vec<(&'static str, f64)>,
@@ -123,7 +123,7 @@ impl Hidden {
         })
     }
 
-    /// This effect in its initial state.
+    /// The effect in its initial state.
     #[must_use]
     pub fn at_rest(&self) -> Self {
         let mut rested = self.clone();

@@ -10,7 +10,7 @@ use thiserror::Error;
 pub struct BasePlantError {
     /// Name of the property.
     pub property: &'static str,
-    /// Its value.
+    /// Value of the property.
     pub value: f64,
     /// Allowed range.
     pub requirement: &'static str,
@@ -72,7 +72,7 @@ impl FlowDelay {
         }
     }
 
-    /// This law with every delay multiplied by `factor`.
+    /// The law with every delay multiplied by `factor`.
     #[must_use]
     pub fn scaled(self, factor: f64) -> Self {
         match self {

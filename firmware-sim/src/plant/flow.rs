@@ -221,7 +221,7 @@ fn resisted(push: f64, resistance: Resistance) -> f64 {
     2.0 * free / (1.0 + (1.0 + 4.0 * drag * free).sqrt()) * push.signum()
 }
 
-/// For the tests of parts.
+/// Access for the tests of parts.
 #[cfg(test)]
 pub(crate) mod bench {
     use super::*;

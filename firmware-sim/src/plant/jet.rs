@@ -140,7 +140,7 @@ impl Jet {
     }
 }
 
-/// For the tests of parts.
+/// Access for the tests of parts.
 #[cfg(test)]
 pub(crate) mod bench {
     use super::*;

@@ -28,7 +28,7 @@ pub enum Place {
     Flow,
     /// The sensor's input.
     Sense,
-    /// From friction to voltage.
+    /// Conversion from friction to voltage.
     Film,
     /// Lag of the voltage.
     FilmLag,
@@ -113,7 +113,7 @@ pub(crate) trait FlowPart: Debug + Send + Sync + BoxedFlow {
         0.0
     }
 
-    /// Its resistance to motion.
+    /// Resistance of the part to motion.
     fn resistance(&self) -> Resistance {
         Resistance::default()
     }

@@ -266,7 +266,7 @@ impl Plant for Rig {
     }
 }
 
-/// For the tests of parts.
+/// Access for the tests of parts.
 #[cfg(test)]
 pub(crate) mod bench {
     use super::*;

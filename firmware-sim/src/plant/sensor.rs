@@ -81,7 +81,7 @@ impl Sensor {
     }
 }
 
-/// For the tests of parts.
+/// Access for the tests of parts.
 #[cfg(test)]
 pub(crate) mod bench {
     use super::*;

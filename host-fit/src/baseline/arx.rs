@@ -109,7 +109,7 @@ impl Arx {
         run.iter().all(|y| y.is_finite()).then_some(run)
     }
 
-    /// This model in the unscaled units of y and u.
+    /// The model in the unscaled units of y and u.
     fn unscaled(&self, scaling: &Scaling) -> Self {
         let per_u = scaling.y_scale / scaling.u_scale;
         let b = self.b.map(|b| b * per_u);

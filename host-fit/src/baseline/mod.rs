@@ -39,7 +39,7 @@ pub struct BaselineFits {
     pub fopdt: Option<f64>,
     /// FIT of the second order with dead time.
     pub sopdt: Option<f64>,
-    /// Of ARX(2,2).
+    /// FIT of ARX(2,2).
     pub arx: Option<f64>,
 }
 

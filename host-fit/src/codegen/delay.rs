@@ -9,7 +9,7 @@ use quote::{format_ident, quote};
 pub(super) struct Written {
     /// The type of the law.
     pub(super) kind: TokenStream,
-    /// Its constants.
+    /// Constants of the law.
     pub(super) constants: TokenStream,
     /// The law as an expression of these constants.
     pub(super) value: TokenStream,

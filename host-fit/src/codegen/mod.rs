@@ -46,7 +46,7 @@ pub enum CodegenError {
     NotFinite {
         /// Name of the constant.
         name: &'static str,
-        /// Its value.
+        /// Value of the constant.
         value: f64,
     },
     /// An effect is neither in the catalogue nor defined by the model.
@@ -55,7 +55,7 @@ pub enum CodegenError {
          nor defined by the model. Remove it from the model."
     )]
     UnknownEffect {
-        /// Its name.
+        /// Name of the effect.
         name: String,
     },
     /// An effect of the catalogue that can be generated in Rust only.
@@ -64,7 +64,7 @@ pub enum CodegenError {
          Write it with `--lang rust`, or give it a form in host-fit/src/user_effect/forms.toml."
     )]
     NoForm {
-        /// Its name.
+        /// Name of the effect.
         name: String,
     },
     /// The model decays too fast for the self-test, or not at all.

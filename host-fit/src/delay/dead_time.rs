@@ -23,7 +23,7 @@ use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 pub struct DeadTime {
     /// Dead time, samples: the first sample that u_k can change is y_{k+1+h}.
     pub samples: f64,
-    /// Its standard error, samples.
+    /// Standard error of the dead time, samples.
     pub standard_error: f64,
     /// Lower end of the 95 % interval, samples.
     pub low: f64,

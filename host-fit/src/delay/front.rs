@@ -14,7 +14,7 @@ use super::spread::mean;
 pub(crate) struct Arrival {
     /// Middle of the front.
     pub(crate) front: usize,
-    /// Its start.
+    /// Start of the front.
     pub(crate) onset: usize,
 }
 

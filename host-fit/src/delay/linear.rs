@@ -362,7 +362,7 @@ impl Free {
         delays: false,
     };
 
-    /// These options with b free or fixed.
+    /// Options with b free or fixed.
     pub(crate) fn with_order(self, order: bool) -> Self {
         Self { order, ..self }
     }

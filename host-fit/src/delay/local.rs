@@ -25,7 +25,7 @@ const RATIOS: [f64; 6] = [0.0, 0.03, 0.08, 0.15, 0.25, 0.6];
 pub(crate) struct EdgeDelayed {
     /// Samples.
     pub(crate) delay: f64,
-    /// Its standard error for fixed time constants, samples.
+    /// Standard error of the delay for fixed time constants, samples.
     pub(crate) standard_error: f64,
 }
 

@@ -36,7 +36,7 @@ pub enum Unmeasured {
 }
 
 impl Unmeasured {
-    /// In words.
+    /// The reason in words.
     #[must_use]
     pub fn words(self) -> &'static str {
         match self {

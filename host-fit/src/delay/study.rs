@@ -58,7 +58,7 @@ pub enum DelayMethod {
 }
 
 impl DelayMethod {
-    /// In words.
+    /// The method in words.
     #[must_use]
     pub fn words(self) -> &'static str {
         match self {

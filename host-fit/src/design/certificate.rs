@@ -250,7 +250,7 @@ impl Positive {
         [self.off.level(), self.on.level()]
     }
 
-    /// This loop for −y: opening becomes closing.
+    /// The loop for −y: opening becomes closing.
     fn mirrored(&self) -> Self {
         let [open, closed] = self.hold;
         let [looks_open, looks_closed] = self.looks;

@@ -30,9 +30,9 @@ pub enum CaseGroup {
     Unseen,
     /// The nearest physical plant with noise.
     Plant,
-    /// That plant with an effect missing in the model.
+    /// The nearest physical plant with an effect that the model lacks.
     Effect,
-    /// That plant under conditions beyond the design.
+    /// The nearest physical plant under conditions beyond the design.
     Disturbance,
 }
 
@@ -47,7 +47,7 @@ impl CaseGroup {
 /// A plant for a trial, in its initial state.
 #[derive(Clone, Debug)]
 pub struct Trial<F> {
-    /// Its group.
+    /// Group of the trial.
     pub group: CaseGroup,
     /// The difference from the model, in words.
     pub name: String,
@@ -58,7 +58,7 @@ pub struct Trial<F> {
 /// Result of one law on one plant.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Case {
-    /// Its group.
+    /// Group of the trial.
     pub group: CaseGroup,
     /// The difference from the model, in words.
     pub name: String,

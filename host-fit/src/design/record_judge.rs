@@ -27,7 +27,7 @@ pub(super) struct RecordJudge {
     pub(super) best: Model,
     /// Names of the identifiable coordinates.
     free: Vec<String>,
-    /// Their covariance, row-major.
+    /// Covariance of the identifiable coordinates, row-major.
     pub(super) covariance: Vec<f64>,
     runs: Runs,
     residuals: Runs,

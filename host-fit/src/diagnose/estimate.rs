@@ -16,7 +16,7 @@ const DEVIATES: f64 = 1.96;
 pub struct ParameterEstimate {
     /// The estimate.
     pub value: f64,
-    /// Its unit.
+    /// Unit of the estimate.
     pub unit: String,
     /// Lower end of the 95 % confidence interval.
     pub low: f64,

@@ -115,7 +115,7 @@ impl Rung {
 /// A candidate compared with the model it was added to.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Ranked {
-    /// Its name.
+    /// Name of the candidate.
     pub effect: String,
     /// Validation error with the candidate, y rms.
     pub validate_rmse: f64,
@@ -141,7 +141,7 @@ pub struct Ranked {
 /// A candidate that was not tried, and why.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct NotTried {
-    /// Its name.
+    /// Name of the candidate.
     pub effect: String,
     /// Why not.
     pub reason: String,

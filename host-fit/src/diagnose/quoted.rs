@@ -9,7 +9,7 @@ use serde::Serialize;
 /// Errors of the given and the final model on records that played no part in choosing the structure.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Quoted {
-    /// Their names.
+    /// Names of the records.
     pub records: Vec<String>,
     /// Root mean square of the given model's free-run error on these records, y.
     pub before_rmse: f64,

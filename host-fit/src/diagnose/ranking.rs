@@ -43,7 +43,7 @@ impl Rival {
         self.judged().map_or(self.promised, measured)
     }
 
-    /// Its fits, if it was refitted.
+    /// Fits of the candidate, if it was refitted.
     pub(super) fn judged(&self) -> Option<&Judged> {
         Some(&self.refitted.as_ref()?.judged)
     }

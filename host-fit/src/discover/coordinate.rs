@@ -74,7 +74,7 @@ impl Coordinate {
         }
     }
 
-    /// Its words without times, joined by `-`: part of a term's name.
+    /// Words of the coordinate without times, joined by `-`: part of a term's name.
     pub(super) fn slug(&self) -> String {
         let words = self.words();
         let kind = words.split(" (").next().unwrap_or(&words);
@@ -89,7 +89,7 @@ impl Coordinate {
         parts.join("-")
     }
 
-    /// Its unit.
+    /// Unit of the coordinate.
     #[must_use]
     pub fn unit(&self) -> Unit {
         match self {
@@ -159,7 +159,7 @@ impl Coordinate {
         Some(other)
     }
 
-    /// Its filter time constant, if that can be fitted.
+    /// Time constant of the coordinate's filter, if that can be fitted.
     pub(super) fn fading(&self) -> Option<f64> {
         match self {
             Self::MemoryOfU(t) | Self::MemoryOfY(t) | Self::MemoryOfRate(t) => Some(*t),
@@ -186,7 +186,7 @@ impl Coordinate {
         }
     }
 
-    /// Its expression in an effect file.
+    /// The coordinate as an expression of an effect file.
     pub(super) fn expression(&self) -> String {
         match self {
             Self::Y => "y".to_owned(),

@@ -5,9 +5,9 @@ use crate::linalg::{dot, gram, solve_symmetric};
 /// Dimension of a parameter of a form.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
-    /// Dimension of g over x to this power.
+    /// Dimension of g/xⁿ, with this n.
     Amplitude(i32),
-    /// Dimension of g over √x.
+    /// Dimension of g/√x.
     OverRoot,
     /// A position or a width in x.
     Place,
@@ -25,7 +25,7 @@ pub(super) struct Card {
 }
 
 impl Card {
-    /// Its search interval, given an initial value and the extent of x.
+    /// Search interval of the parameter, given an initial value and the extent of x.
     pub(super) fn range(&self, value: f64, x: [f64; 2]) -> [f64; 2] {
         let extent = (x[1] - x[0]).max(f64::MIN_POSITIVE);
         match self.kind {
@@ -39,7 +39,7 @@ impl Card {
         }
     }
 
-    /// Its unit, given those of g and x.
+    /// Unit of the parameter, given those of g and x.
     pub(super) fn unit(&self, of_g: &'static str, of_x: &'static str) -> &'static str {
         match self.kind {
             Kind::Amplitude(0) => of_g,
@@ -55,7 +55,7 @@ impl Card {
 pub(super) struct Form {
     /// As an expression of `{x}`.
     pub(super) expression: &'static str,
-    /// Its parameters, amplitudes first.
+    /// Parameters of the formula, amplitudes first.
     pub(super) parameters: &'static [Card],
     amplitudes: usize,
     /// g at x for these parameters.

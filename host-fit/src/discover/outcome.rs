@@ -83,7 +83,7 @@ pub struct FoundTerm {
     pub alike: Vec<Alike>,
     /// Share of bootstrap resamples of the validation records in which this place and coordinate fit best, %.
     pub stability_percent: f64,
-    /// Its effect file.
+    /// Effect file of the term.
     #[serde(skip)]
     pub file: String,
 }
@@ -95,7 +95,7 @@ pub struct Discovery {
     pub terms: Vec<FoundTerm>,
     /// Validation errors from the given model to the final one.
     pub ladder: Vec<Rung>,
-    /// For each place, the detectable size of a term.
+    /// Detectable size of a term, by place.
     pub smallest_seen: BTreeMap<String, Smallest>,
     /// How the validation error was obtained.
     pub held_out_by: HeldOutBy,
@@ -122,7 +122,7 @@ pub struct Discovery {
 pub(super) struct Found {
     /// The reported form: a formula, or the curve.
     pub(super) term: Term,
-    /// Its curve, as fitted.
+    /// The term as a curve, as fitted.
     pub(super) curve: Term,
     /// Standard errors of the curve's values.
     pub(super) errors: Vec<f64>,

@@ -19,7 +19,7 @@ pub enum Place {
 }
 
 impl Place {
-    /// Its name in documents.
+    /// Name of the place in documents.
     #[must_use]
     pub fn word(self) -> &'static str {
         match self {
@@ -59,7 +59,7 @@ impl Entry {
         Self::Sensitivity,
     ];
 
-    /// Its place.
+    /// Place of the term.
     #[must_use]
     pub fn place(self) -> Place {
         match self {

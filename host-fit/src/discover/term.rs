@@ -328,7 +328,7 @@ impl Term {
         text
     }
 
-    /// Its definition.
+    /// Definition of the term as an effect file.
     pub(super) fn definition(&self) -> Result<&'static Definition, DefinitionError> {
         Definition::from_toml(&self.file(""), &self.name())
     }

@@ -86,7 +86,7 @@ pub enum ExperimentError {
         /// Noise, y.
         noise: f64,
     },
-    /// For every command some model diverges.
+    /// At least one model diverges under every command.
     #[error(
         "a model diverges under every command that was tried. Identify it again with fewer lags or with `--objective free-run`."
     )]

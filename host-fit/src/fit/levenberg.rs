@@ -53,7 +53,7 @@ impl FitStop {
         )
     }
 
-    /// In words.
+    /// The reason in words.
     #[must_use]
     pub fn words(self) -> &'static str {
         match self {

@@ -36,7 +36,7 @@ pub enum IdentifyError {
     TooShort {
         /// The record.
         record: String,
-        /// Its samples.
+        /// Number of samples in the record.
         samples: usize,
         /// Longest lag asked for.
         longest: usize,

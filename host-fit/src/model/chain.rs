@@ -11,7 +11,7 @@ use model_core::{Real, pairs};
 #[derive(Clone, Debug)]
 #[allow(clippy::large_enum_variant, reason = "a handful per model")]
 pub enum HostEffect<T: Real> {
-    /// From `model_core::effects`.
+    /// An effect of the catalogue, `model_core::effects`.
     Catalogue(AnyEffect<T, Ring<T>>),
     /// An effect from an effect file.
     User(UserEffect<T>),

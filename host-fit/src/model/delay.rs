@@ -22,7 +22,7 @@ pub enum Delay {
 pub struct TransportLaw {
     /// The law's card.
     pub spec: &'static Spec,
-    /// Its parameters, in the order and units of the card.
+    /// Parameters of the law, in the order and units of the card.
     pub parameters: Vec<f64>,
     /// f_l, one factor for each input.
     pub factors: Vec<f64>,

@@ -25,7 +25,7 @@ pub struct Footprint {
 /// A measured channel.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Channel {
-    /// Its name in records and model files.
+    /// Name of the channel in records and model files.
     pub name: String,
     /// Its reference value, in its unit; 1 if the model file has none.
     pub reference: f64,

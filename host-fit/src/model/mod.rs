@@ -149,7 +149,7 @@ pub struct Training {
     pub seed: u64,
     /// Objective of the delay search.
     pub objective: String,
-    /// Its value.
+    /// Value of the objective.
     pub objective_value: f64,
     /// FIT of the free run over the identify records, %.
     pub identify_fit_percent: f64,

@@ -21,7 +21,7 @@ pub enum Kind {
 pub struct Coordinate {
     /// Readable name: `a1`, `c21`, `valve-lag.opening_time`.
     pub name: String,
-    /// Its kind.
+    /// Kind of the coordinate.
     pub kind: Kind,
 }
 

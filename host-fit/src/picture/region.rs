@@ -13,7 +13,7 @@ pub struct Region<'a> {
     pub across: &'a str,
     /// Label of the vertical axis.
     pub up: &'a str,
-    /// Its contour, ordered by angle.
+    /// Contour of the region, ordered by angle.
     pub contour: &'a [[f64; 2]],
 }
 

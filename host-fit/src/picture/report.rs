@@ -21,7 +21,7 @@ pub enum Tone {
 /// A number in a tile.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct KeyNumber {
-    /// Its label, for example `"Validation FIT"`.
+    /// Label of the figure, for example `"Validation FIT"`.
     pub label: String,
     /// The number with its unit, as text.
     pub value: String,

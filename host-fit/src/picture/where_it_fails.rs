@@ -26,7 +26,7 @@ pub struct FailureBin {
 pub struct FailureView<'a> {
     /// Name of the coordinate, for example `"time since rising edge"`.
     pub coordinate: String,
-    /// Its unit; empty for none.
+    /// Unit of the coordinate; empty for none.
     pub unit: &'a str,
     /// Share of the error above the noise that the coordinate explains, cross-validated, 0 to 1.
     pub explained_fraction: Option<f64>,

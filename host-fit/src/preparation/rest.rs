@@ -19,13 +19,13 @@ fn mean(values: &[f64]) -> f64 {
 struct Rests<'a> {
     /// Each record that rests long enough, with y of its rest.
     rests: Vec<(&'a Record, &'a [f64])>,
-    /// Of y within a rest.
+    /// Noise of y within a rest.
     noise: Noise,
 }
 
 /// Noise around the mean of each of several series.
 struct Noise {
-    /// Its variance.
+    /// Variance of y within a rest.
     within: f64,
     /// Number of samples per independent sample.
     dependence: f64,

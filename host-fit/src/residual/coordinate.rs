@@ -35,7 +35,7 @@ pub enum FailureCoordinate {
     TimeInRecord,
     /// A measured channel, in its own unit.
     Channel(
-        /// Its column.
+        /// Column of the channel.
         String,
     ),
     /// Number of the pulse that acts on the flow, from 1.

@@ -45,7 +45,7 @@ impl Progress for () {
 pub struct Success {
     /// The better point.
     pub point: Point,
-    /// Its value.
+    /// Value of the objective there.
     pub value: f64,
 }
 

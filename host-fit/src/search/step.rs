@@ -13,7 +13,7 @@ use super::variable::Point;
 pub struct Around<'a> {
     /// The incumbent.
     pub point: &'a [i64],
-    /// Its value.
+    /// Value of the objective at the incumbent.
     pub value: f64,
     /// The mesh around it.
     pub mesh: &'a Mesh,

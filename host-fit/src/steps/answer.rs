@@ -60,14 +60,14 @@ impl Answer {
         }
     }
 
-    /// With its evidence.
+    /// Sets the evidence.
     #[must_use]
     pub fn evidence(mut self, text: impl Into<String>) -> Self {
         self.evidence = text.into();
         self
     }
 
-    /// With its confidence.
+    /// Sets the confidence.
     #[must_use]
     pub fn confidence(mut self, text: impl Into<String>) -> Self {
         self.confidence = text.into();

@@ -8,13 +8,13 @@ use serde::Serialize;
 /// An effect of the catalogue. Serialises to the keys of `effects --json`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct EffectEntry {
-    /// Its name.
+    /// Name of the effect.
     pub name: &'static str,
     /// Where it acts: `jet`, `delay`, `flow` or `sensor`.
     pub place: &'static str,
     /// The effect in one line.
     pub summary: &'static str,
-    /// Its equation.
+    /// Equation of the effect.
     pub equation: &'static str,
     /// The measured channel that it needs, if any.
     pub channel: Option<&'static str>,
@@ -28,16 +28,16 @@ pub struct EffectEntry {
     pub confused_with: Option<&'static str>,
     /// Whether it is a base term, which is never reported as missing.
     pub base: bool,
-    /// Its parameters.
+    /// Parameters of the effect.
     pub parameters: Vec<ParameterEntry>,
 }
 
 /// A parameter of an effect.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ParameterEntry {
-    /// Its name.
+    /// Name of the parameter.
     pub name: &'static str,
-    /// Its unit.
+    /// Unit of the parameter.
     pub unit: &'static str,
     /// Lower end of the searched range.
     pub low: f64,

@@ -44,13 +44,13 @@ pub struct SideBySide {
 /// One of several models.
 #[derive(Clone, Debug, Serialize)]
 pub struct NamedComparison {
-    /// Its name.
+    /// Name of the model.
     pub model: String,
     /// Number of parameters: non-zero coefficients, delay and effects.
     pub parameters: usize,
-    /// Its effects.
+    /// Effects of the model.
     pub effects: Vec<String>,
-    /// Its own comparison.
+    /// The model compared with the recordings.
     #[serde(flatten)]
     pub comparison: Comparison,
 }

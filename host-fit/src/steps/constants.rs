@@ -19,7 +19,7 @@ pub struct BoardConstants {
     pub bytes: usize,
     /// Effects of the model.
     pub effects: Vec<String>,
-    /// Its law.
+    /// Law of the model.
     pub law: Option<Law>,
 }
 

@@ -53,9 +53,9 @@ pub struct Design {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum DesignOutcome {
-    /// For a tracking law.
+    /// Figures of a tracking law.
     Track(TrackDesign),
-    /// For a maximising law.
+    /// Figures of a maximising law.
     Maximise(Optimum),
 }
 

@@ -80,7 +80,7 @@ pub enum StepError {
     SamplePeriod {
         /// The recordings.
         place: Box<FilePlace>,
-        /// Their sampling period, s.
+        /// Sampling period of the recordings, s.
         data: f64,
         /// The model's, s.
         model: f64,
@@ -103,7 +103,7 @@ pub enum StepError {
     InputPeriod {
         /// The command file.
         place: Box<FilePlace>,
-        /// Its sampling period, s.
+        /// Sampling period of the input file, s.
         input: f64,
         /// The model's, s.
         model: f64,

@@ -26,7 +26,7 @@ pub struct Extension {
     /// The effects that were added: one name, or a list of them.
     #[serde(rename = "effect", serialize_with = "one_or_several")]
     pub effects: Vec<String>,
-    /// Their parameters by name; preceded by the effect's name if several were added.
+    /// Parameters of the effects by name; preceded by the effect's name if several were added.
     pub parameters: BTreeMap<String, ParameterEstimate>,
     /// Validation indicators before; none if the model diverges on these records.
     pub before: Option<Indicators>,

@@ -34,7 +34,7 @@ impl Bench {
         let inner = units.records_in(&prepared.records);
         let mid_run = !prepared.at_rest;
         let options = FitOptions {
-            // Where records start at rest, a level is the sensor's offset, which is a term of the search.
+            // Of records that start at rest, a constant is the sensor's offset: a term of the search, no free constant.
             constant: mid_run,
             ..FitOptions::default()
         };

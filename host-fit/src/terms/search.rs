@@ -24,7 +24,7 @@ use std::sync::atomic::{AtomicBool, Ordering as Memory};
 pub struct Hypothesis {
     /// The terms.
     pub terms: Vec<Term>,
-    /// Its fits and its validation error.
+    /// Fits and validation error of the model.
     pub judged: Judged,
     /// Whether further terms were already screened on it.
     pub(super) expanded: bool,
@@ -95,7 +95,7 @@ impl Hypothesis {
             .min_by(|a, b| a.judged.rmse().total_cmp(&b.judged.rmse()))
     }
 
-    /// Its terms in words.
+    /// The terms in words.
     #[must_use]
     pub fn words(&self) -> String {
         let names: Vec<String> = self.terms.iter().map(Term::name).collect();

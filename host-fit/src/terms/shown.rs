@@ -24,7 +24,7 @@ pub(crate) struct Shown {
 /// The part of a change that other terms cannot imitate.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Left {
-    /// Its energy.
+    /// Energy of that part.
     pub(crate) energy: f64,
     /// Standard deviation of the inner product of that part with the error.
     pub(crate) deviation: f64,

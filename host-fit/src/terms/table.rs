@@ -25,7 +25,7 @@ pub struct Candidate {
     pub learned: f64,
     /// Share of the error energy explained on the validation samples.
     pub held_out: f64,
-    /// Its columns in the table of changes.
+    /// Columns of the effect in the table of changes.
     pub(super) columns: Vec<usize>,
 }
 

@@ -24,7 +24,7 @@ pub enum Term {
     Wake(f64),
     /// A base term in the jet path or the reading, with starting values.
     Path {
-        /// Its card.
+        /// Card of the term.
         spec: &'static Spec,
         /// Starting values of its parameters.
         parameters: Vec<f64>,
@@ -33,7 +33,7 @@ pub enum Term {
     Offset,
     /// A physical effect, with starting values.
     Effect {
-        /// Its card.
+        /// Card of the term.
         spec: &'static Spec,
         /// Starting values of its parameters.
         parameters: Vec<f64>,
@@ -139,7 +139,7 @@ impl Term {
         other
     }
 
-    /// This effect with other starting values.
+    /// The effect with other starting values.
     #[must_use]
     pub fn with_parameters(&self, values: Vec<f64>) -> Self {
         let mut other = self.clone();
@@ -174,7 +174,7 @@ impl Term {
         }
     }
 
-    /// Its name in progress messages and tables.
+    /// Name of the term in progress messages and tables.
     #[must_use]
     pub fn name(&self) -> String {
         match self {

@@ -46,9 +46,9 @@ pub enum DefinitionError {
     Syntax {
         /// The file.
         place: String,
-        /// From 1.
+        /// Line of the file, from 1.
         line: usize,
-        /// From 1.
+        /// Column of the line, from 1.
         column: usize,
         /// The problem.
         problem: String,
@@ -161,7 +161,7 @@ impl Definition {
         Ok(definition)
     }
 
-    /// Its card, as for effects of the catalogue.
+    /// Card of the effect, as for effects of the catalogue.
     #[must_use]
     pub fn spec(&'static self) -> &'static Spec {
         &self.spec
@@ -179,7 +179,7 @@ impl Definition {
         self.scales() && self.spec.channel.is_some()
     }
 
-    /// Its operations at a sample.
+    /// Operations of the effect at a sample.
     pub(crate) fn program(&self) -> &Program {
         &self.program
     }

@@ -215,7 +215,7 @@ impl Lines {
 pub(crate) struct Carried {
     pub(crate) name: String,
     pub(crate) start: f64,
-    /// Its next value.
+    /// Next value of the state.
     pub(crate) update: Register,
 }
 

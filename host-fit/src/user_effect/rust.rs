@@ -77,7 +77,7 @@ struct Writer {
 struct Field {
     name: Ident,
     kind: TokenStream,
-    /// Its initialiser; none if a result has its name.
+    /// Initialiser of the variable; none if a result has its name.
     value: Option<TokenStream>,
 }
 

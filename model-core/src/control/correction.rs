@@ -67,7 +67,7 @@ impl<T: Real, const A: usize> Correction<T, A> {
         let flow = estimate + residual;
         let missed = flow - self.predictions.back(usize::from(law.lead));
         if reference != self.reference {
-            // The model error differs at another level.
+            // The model error differs at another level of y, so integration has its full rate again.
             self.reference = reference;
             self.share = T::ONE;
         }

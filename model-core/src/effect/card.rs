@@ -51,7 +51,7 @@ pub struct Parameter {
     pub starts: &'static [f64],
     /// How it enters.
     pub influence: Influence,
-    /// Its physically possible sign.
+    /// Physically possible sign of the parameter.
     pub sign: Sign,
     /// Its value if a model file does not contain it; `None` if it is required.
     pub left_out: Option<f64>,
@@ -165,9 +165,9 @@ pub enum StartValue {
     Quantile(f64),
     /// The present delay plus this many samples.
     Delay(f64),
-    /// This multiple of the flow's time constant.
+    /// A multiple of the flow's time constant.
     TimeConstants(f64),
-    /// This multiple of the record length.
+    /// A multiple of the record length.
     Records(f64),
 }
 
@@ -345,7 +345,7 @@ pub struct Spec {
     pub parameters: &'static [Parameter],
     /// Starting points of a search over the parameters.
     pub starts: Starts,
-    /// Its amplitude parameter, if it has one.
+    /// Amplitude parameter of the effect, if it has one.
     pub amplitude: Option<Amplitude>,
     /// The measured channel it needs in addition to u and y.
     pub channel: Option<&'static str>,

@@ -16,7 +16,7 @@ pub enum Unit {
     PerSecond,
     /// Samples.
     Samples,
-    /// That of y.
+    /// The unit of y.
     Y,
     /// 1/y.
     PerY,

@@ -21,7 +21,7 @@ pub struct EdgeDependentDelay<T> {
 /// The duration of the present command level.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Run<T> {
-    /// Its level.
+    /// The present level of the command.
     level: T,
     /// The level that was passed on when the command changed to the present level.
     before: T,

@@ -161,7 +161,7 @@ pub(super) fn inserted(rows: &[usize], time: &Variable, place: Place) -> Option<
     })
 }
 
-/// The first lines of these rows; samples in files without lines.
+/// Line numbers of the first of these rows; sample numbers for files without lines.
 fn listed(rows: &[usize], variable: &Variable, place: Place) -> String {
     const MOST: usize = 5;
     let places = || rows.iter().take(MOST).map(|&row| place(variable, row));

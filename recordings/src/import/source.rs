@@ -63,7 +63,7 @@ pub struct Variable {
     pub name: String,
     /// Unit in the header, if any.
     pub unit: Option<String>,
-    /// Its values.
+    /// Values of the variable.
     pub values: Vec<f64>,
     pub(super) exactness: Exactness,
     /// Rows in which its cell is empty; their values are NaN.
@@ -80,7 +80,7 @@ pub(super) struct Unread {
     pub(super) name: String,
     /// Line of the first such cell.
     pub(super) line: u64,
-    /// Its contents.
+    /// Contents of the file.
     pub(super) text: String,
 }
 

@@ -20,7 +20,7 @@ const CPU: &str = "step used CPU seconds: ";
 #[derive(Clone, Debug, Default)]
 pub(super) struct Done {
     pub(super) name: &'static str,
-    /// By the clock, s.
+    /// Elapsed time, s.
     pub(super) wall: f64,
     /// Processor time of all its processes, s; unknown if the system does not provide it.
     pub(super) cpu: Option<f64>,
@@ -170,7 +170,7 @@ fn cpu_seconds() -> Option<f64> {
 }
 
 impl Done {
-    /// Its line in the summary.
+    /// Line of the step in the summary.
     pub(super) fn line(&self) -> String {
         let verdict = if self.failure.is_some() {
             "FAILED"

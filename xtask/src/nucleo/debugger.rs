@@ -15,7 +15,7 @@ const ANSWER: Duration = Duration::from_secs(10);
 pub(super) enum Stop {
     /// Before an access to this watched word.
     Access(u32),
-    /// On request.
+    /// The debugger asked it to stop.
     Asked,
 }
 

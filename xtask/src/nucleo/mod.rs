@@ -22,7 +22,7 @@ use std::time::{Duration, Instant};
 
 pub(crate) const TASK: Task = Task {
     name: "nucleo",
-    does: "the Nucleo's own program on QEMU's STM32F405: registers against the manual, then samples, operator, faults",
+    does: "runs the Nucleo's own program on QEMU's STM32F405: tests registers against the manual, then samples, operator and faults",
     run: |_| nucleo(),
 };
 

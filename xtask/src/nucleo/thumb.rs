@@ -4,7 +4,7 @@
 /// A load or store of one register.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Access {
-    /// From memory to the register.
+    /// True for a load: from memory to the register.
     pub(super) load: bool,
     /// Bytes, 1, 2 or 4.
     pub(super) size: u8,

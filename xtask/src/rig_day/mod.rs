@@ -14,7 +14,7 @@ use std::time::Instant;
 
 pub(crate) const TASK: Task = Task {
     name: "rig-day",
-    does: "the whole workflow on a simulated rig with the board under QEMU: --short, --brief (as CI), --page writes docs/rig-day.md",
+    does: "runs the whole workflow on a simulated rig with the board under QEMU: --short, --brief (as CI), --page writes docs/rig-day.md",
     run: rig_day,
 };
 
@@ -50,7 +50,7 @@ const LONG: Form = Form {
     watched: ["90", "30"],
     law: 1.0,
 };
-/// For the page.
+/// The form on the page.
 const SHORT: Form = Form {
     identify: &["step", "sq4-50", "random-a"],
     validate: &["sq2-30", "random-b"],

@@ -61,7 +61,7 @@ impl<L: LineLaw> JetPart for Line<L> {
     }
 }
 
-/// For tests: arrival times of edges.
+/// Arrival times of edges, for tests.
 #[cfg(test)]
 pub(super) mod bench {
     use super::Part;

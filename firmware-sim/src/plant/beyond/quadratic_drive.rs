@@ -8,11 +8,11 @@ physics! {
     /// square·s² in the level of the flow.
     QuadraticDrive = "quadratic-drive" at Flow
     parameters(base, rng) {
-        /// Its coefficient.
+        /// Coefficient of s².
         square ["1/y", FINITE] = size / base.gain;
     }
     where {
-        // From about a quarter of 1/gain the flow would diverge.
+        // The flow would diverge from a coefficient of about a quarter of 1/gain on.
         let size = if rng.random_bool(0.5) {
             rng.random_range(0.10..0.18)
         } else {

@@ -7,7 +7,7 @@ use crate::plant::part::{JetPart, Part, Piece};
 
 /// The law of the jet's strength.
 pub(super) trait StrengthLaw: Copy + Debug + Send + Sync + 'static {
-    /// Its strength at `t`, relative to the nominal jet.
+    /// Strength of the jet at `t`, relative to the nominal jet.
     fn strength(&self, pulses: &Pulses, t: f64) -> f64;
 }
 

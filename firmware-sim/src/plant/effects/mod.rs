@@ -163,9 +163,9 @@ pub(crate) trait Physics: Copy + Debug + PartialEq + Sized + 'static {
     const NAME: &'static str;
     /// The effect of the catalogue that it is or resembles.
     const RESEMBLES: &'static str = Self::NAME;
-    /// Its place.
+    /// Place of the effect.
     const PLACE: Place;
-    /// Its parameters, in the catalogue's order.
+    /// Parameters of the effect, in the catalogue's order.
     const PARAMETERS: &'static [Card<Self>];
     /// Commands with which it is visible.
     const SHOWS_WITH: ShowsWith = ShowsWith::OnOff;
@@ -363,12 +363,12 @@ macro_rules! catalogue {
                 match self { $(Self::$effect(_) => $effect::NAME,)+ }
             }
 
-            /// Its place in the plant.
+            /// Place of the effect in the plant.
             pub fn place(&self) -> Place {
                 match self { $(Self::$effect(_) => $effect::PLACE,)+ }
             }
 
-            /// Its position in the plant.
+            /// Position of the effect in the plant.
             pub(crate) fn order(&self) -> (Place, usize) {
                 let names = Self::NAMES.iter();
                 (self.place(), names.take_while(|name| **name != self.name()).count())
@@ -389,7 +389,7 @@ macro_rules! catalogue {
                 match self { $(Self::$effect(effect) => parameters(effect),)+ }
             }
 
-            /// This effect with one parameter changed.
+            /// The effect with one parameter changed.
             ///
             /// # Errors
             /// [`EffectError::UnknownParameter`] when the effect has no such parameter.

@@ -10,7 +10,7 @@ use workbench::{Refusal, beneath};
 /// The effect files of a project.
 pub(super) struct OwnEffects(PathBuf);
 
-/// Their folder in the project.
+/// Folder of the effect files in the project.
 const EFFECTS: &str = "effects";
 
 impl OwnEffects {

@@ -160,7 +160,7 @@ impl UnrestSource {
     }
 
     fn sample(&mut self) -> f64 {
-        // The variance of this t is 3.
+        // The variance of this Student distribution is 3.
         let tail = self.tails.sample(&mut self.rng) / 3.0_f64.sqrt();
         let off = if self.rng.random_bool(self.size.outliers.clamp(0.0, 1.0)) {
             self.size.outlier_size

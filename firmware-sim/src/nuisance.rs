@@ -73,7 +73,7 @@ impl Nuisances {
         all
     }
 
-    /// The effect that is a correct name for one of them.
+    /// The effect of the catalogue that correctly names one of the nuisances.
     pub(super) fn effect(&self) -> Option<&'static str> {
         (self.drift != 0.0).then_some(ThermalDrift::NAME)
     }

@@ -53,7 +53,7 @@ impl Units {
     pub const OWN: Self = Self { time: 1.0, y: 1.0 };
 }
 
-/// A data set with the truth behind it.
+/// A data set with the rig that made it.
 #[derive(Debug, Clone)]
 pub struct Recorded {
     /// The data that a user of the tool would have.

@@ -11,7 +11,7 @@ use model_core::control::{HoldTimes, Pulses, Tracking};
 /// The lockstep rig at 1 kHz, without a measured channel.
 pub const SETTINGS: Settings = settings(&[], 0.001);
 
-/// The law of models without one of their own.
+/// The law of a model that has no designed law.
 pub const RELAY: Relay = Relay {
     opens_below: 0.45,
     shuts_above: 0.55,
@@ -33,11 +33,11 @@ pub const fn settings(references: &[f32], period_s: f32) -> Settings {
     }
 }
 
-/// The law of a generated file: its constants, or none.
+/// The law of a generated file: its constants, or no law.
 pub trait OrRelay {
     /// Type of the law.
     type Law;
-    /// The law, or `relay` if there is none.
+    /// The law; `relay` if the file has no law.
     fn or(self, relay: Relay) -> Self::Law;
 }
 

@@ -119,7 +119,7 @@ pub struct Controller<L> {
 }
 
 impl<L: Law> Controller<L> {
-    /// Weight of a residual in its average.
+    /// Weight of a residual in the average of residuals.
     const SHARE: f32 = 1.0 / 64.0;
 
     /// The initial state, disarmed.
@@ -233,7 +233,7 @@ impl<L: Law> Controller<L> {
         &self.settings
     }
 
-    /// y* at this sample; NaN for a law without one.
+    /// y* at this sample; NaN for a law without a reference.
     #[must_use]
     pub fn reference(&self) -> f32 {
         self.law.reference()
@@ -503,7 +503,7 @@ mod tests {
         );
     }
 
-    /// 49 days at 1 kHz: nothing may happen at 2³².
+    /// 49 days at 1 kHz: the loop must run on past 2³² samples.
     #[test]
     fn time_goes_on_beyond_32_bits() {
         let mut near = controller();

@@ -35,7 +35,7 @@ pub enum Unchanged {
     Outside,
     /// The preceding change is not complete.
     Pending,
-    /// The law has no such setting.
+    /// The law does not have this setting.
     NoSetting,
     /// No law is running.
     NotRunning,
@@ -47,7 +47,7 @@ pub trait Law {
     fn act(&mut self, y: f32, channels: &[f32]) -> Action;
     /// Records a sample at which the valve is at `open`, whatever the law would have decided.
     fn follow(&mut self, open: bool, y: f32, channels: &[f32]) -> Action;
-    /// y*, the law's reference; NaN without one.
+    /// y*, the law's reference; NaN for a law without a reference.
     fn reference(&self) -> f32;
     /// The settings that may be changed.
     fn settings(&self) -> Settings;

@@ -20,11 +20,11 @@ pub struct Player {
     runs: Vec<u32, RUNS>,
     /// The present run.
     at: usize,
-    /// Samples left of it.
+    /// Samples left of the present run.
     left: u32,
-    /// Repeats to come after this one.
+    /// Repeats to come after the present one.
     repeats: u32,
-    /// Samples to wait before the first one, with the valve closed.
+    /// Samples to wait before the first repeat, with the valve closed.
     wait: u32,
 }
 
@@ -41,7 +41,7 @@ impl Player {
         }
     }
 
-    /// Stores runs from index `at` on; later ones are discarded.
+    /// Stores runs from index `at` on, in place of all runs stored from there on.
     ///
     /// # Errors
     /// [`Status::Missing`] if earlier runs are missing, [`Status::TooLong`] if they do not fit.
@@ -101,7 +101,7 @@ impl Player {
         for (index, run) in self.runs.iter().enumerate() {
             let open = index % 2 == 1;
             let length = if index == 0 || (index == last && !open) {
-                // Closed before the command, after it, or between two repeats.
+                // The valve is closed before the command, after it, or between two repeats.
                 if repeats == 1 || last == 0 {
                     continue;
                 }
@@ -112,7 +112,7 @@ impl Player {
                 };
                 let between = lead.saturating_add(tail);
                 if between == 0 {
-                    // Open to open: both runs form one.
+                    // The valve is open at the end and at the start: both runs form one.
                     continue;
                 }
                 between

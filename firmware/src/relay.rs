@@ -10,9 +10,9 @@ use model_core::model::StateOf;
 /// A relay with hysteresis and hold times.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Relay {
-    /// Opens below this, y.
+    /// The valve opens below this level, y.
     pub opens_below: f32,
-    /// Closes above this, y.
+    /// The valve closes above this level, y.
     pub shuts_above: f32,
     /// Shortest times, samples.
     pub hold: HoldTimes,
@@ -47,12 +47,12 @@ impl<M: Parts<f32>, Y: Memory<f32>, J: Memory<f32>, const A: usize> Designed<M, 
         hold.shut();
     }
 
-    /// The middle of its two thresholds.
+    /// The middle of the relay's two thresholds.
     fn reference(&self, _hold: &Hold) -> f32 {
         0.5 * (self.opens_below + self.shuts_above)
     }
 
-    /// It has no constants to check, because it is not generated.
+    /// The relay has no constants to check, because it is not generated.
     fn holds(
         &self,
         _golden: &GoldenLaw,

@@ -6,9 +6,9 @@ use embedded_hal::digital::OutputPin;
 
 /// A sensor with its sample clock.
 pub trait Sensor {
-    /// The newest reading in counts; not finite if there is none.
+    /// The newest reading in counts; not finite if there is no reading.
     fn counts(&mut self) -> f32;
-    /// The newest reading of the measured channel, in the same form.
+    /// The newest reading of the measured channel in counts; not finite if there is no reading.
     fn channel(&mut self) -> f32;
 }
 
@@ -40,7 +40,7 @@ where
 {
     /// Closes the valves and waits for the operator.
     pub fn new(controller: Controller<L>, sensor: S, clock: C, mut valve: V, mut lamp: A) -> Self {
-        // Pins of a microcontroller do not fail; others are retried each sample.
+        // Pins of a microcontroller do not fail; a pin that fails is set again at the next sample.
         let _ = valve.set_low();
         let _ = lamp.set_low();
         let last = clock.periods();

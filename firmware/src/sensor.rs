@@ -30,9 +30,9 @@ impl Calibration {
 /// Limits of a healthy sensor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Range {
-    /// Readings at or below it are at the lower rail, counts.
+    /// Readings at or below this level are at the lower rail, counts.
     pub lower_rail: f32,
-    /// Readings at or above it are at the upper rail, counts.
+    /// Readings at or above this level are at the upper rail, counts.
     pub upper_rail: f32,
     /// Equal readings in a row that count as a stuck sensor: noise changes a healthy reading by a count from time
     /// to time.
@@ -42,11 +42,11 @@ pub struct Range {
 /// A measured channel that the model's effects need.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Channel {
-    /// Conversion from counts to its unit.
+    /// Conversion from counts to the channel's unit.
     pub calibration: Calibration,
     /// Limits of a healthy channel.
     pub range: Range,
-    /// Value used without a reading, in its unit.
+    /// Value used without a reading, in the channel's unit.
     pub reference: f32,
 }
 

@@ -24,7 +24,7 @@ pub struct Dual<const N: usize> {
 }
 
 impl<const N: usize> Dual<N> {
-    /// A number that depends on nothing.
+    /// A number whose derivatives are 0.
     #[inline(always)]
     #[must_use]
     pub const fn constant(value: f64) -> Self {
@@ -42,7 +42,7 @@ impl<const N: usize> Dual<N> {
         self
     }
 
-    /// ∂value/∂parameter, `N` − 1 of them.
+    /// The `N` − 1 derivatives ∂value/∂parameter.
     #[inline(always)]
     #[must_use]
     pub fn partials(&self) -> &[f64] {

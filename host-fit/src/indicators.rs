@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 /// Indicators of a free run over a record, or over several together.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Indicators {
-    /// The record's name, or `identify` / `validate` for all of them.
+    /// The record's name; `identify` or `validate` for all records of this use.
     pub name: String,
     /// `identify` or `validate`.
     #[serde(rename = "use")]
@@ -122,9 +122,9 @@ impl Sums {
 pub struct Scores {
     /// One entry per record, in the data set's order.
     pub records: Vec<Indicators>,
-    /// All identify records together; none if there are none.
+    /// All identify records together; `None` without such records.
     pub identify: Option<Indicators>,
-    /// All validate records together; none if there are none.
+    /// All validate records together; `None` without such records.
     pub validate: Option<Indicators>,
 }
 

@@ -7,7 +7,7 @@ use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// A collection whose items can be distributed one by one.
+/// A collection whose items can be given to different threads.
 pub(crate) trait Items {
     type Item;
 

@@ -183,7 +183,7 @@ impl Circumstances {
         SAMPLE_PERIOD_S * self.units.time
     }
 
-    /// Length of a run of this many samples at the model's period.
+    /// Length at the model's period of a run of this many samples at 1 kHz.
     fn span(&self, samples: usize) -> usize {
         span(samples, self.sample_period_s())
     }

@@ -31,7 +31,7 @@ rules! {
     power: f64 = 0.8, "share of cases", "convention; `cargo xtask calibrate` counts";
     /// Most unnamed terms that may imitate the effect.
     terms: usize = 6, "", "number of terms that `identify` adds for a flow with two memories";
-    /// Penalty of each of those terms, in parameters.
+    /// Penalty of each of these terms, in parameters.
     term_cost: f64 = 2.0, "parameters", "a lag and its weight";
     /// Factor on the first-order detectable amplitude, because a search that moves all lags imitates more.
     margin: f64 = 2.0, "times the amplitude", "`cargo xtask calibrate`: without the factor 13 of 37 effects of the stated size were named, with it 9 of 15";
@@ -44,7 +44,7 @@ rules! {
 pub struct Detectable {
     /// The effect.
     pub effect: String,
-    /// The parameter that is its amplitude.
+    /// Name of the amplitude parameter.
     pub parameter: String,
     /// The amplitude's unit.
     pub unit: String,

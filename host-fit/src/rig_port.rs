@@ -82,7 +82,7 @@ fn open(device: &Path, pace: Option<Pace>) -> Result<Host, LineError> {
     Ok(Host::new(Port::serial(device)?, session(), pace))
 }
 
-/// A number that identifies this host; 0 means no host.
+/// A random number for this host; 0 means no host.
 fn session() -> u32 {
     // The standard library seeds its hash keys at random.
     (RandomState::new().build_hasher().finish() as u32).max(1)

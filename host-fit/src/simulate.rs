@@ -144,7 +144,7 @@ pub struct Simulator<T: Real> {
     usual: f64,
     /// Samples after which a slow wake and a lagging drive have settled.
     fades: usize,
-    /// The sensor's offset: the reading is the flow plus this.
+    /// The sensor's offset: the reading is the flow plus the offset.
     zero: T,
 }
 
@@ -314,7 +314,7 @@ impl<T: Real> Simulator<T> {
         Some((u, T::from_f64(y)))
     }
 
-    /// How long they are held constant: until the memories are filled.
+    /// Number of samples for which the signals are held constant: until the memories are filled.
     fn samples_held(&self) -> usize {
         self.memory.outputs.max(self.memory.jets).max(self.fades)
     }

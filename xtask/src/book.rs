@@ -202,7 +202,7 @@ fn catalogue(effects: &[Effect]) -> String {
     }
     text.push_str(
         "\nTerms that `identify` adds by itself and that are never reported as missing: [base terms](base-terms.md). An effect that is not\n\
-         here: [write your own](user-effects.md), or let [`discover`](discover.md) find it. Effects for everybody: [adding an effect](adding-an-effect.md).\n",
+         here: [write your own](user-effects.md), or let [`discover`](discover.md) find it. To add an effect to the catalogue: [adding an effect](adding-an-effect.md).\n",
     );
     text
 }

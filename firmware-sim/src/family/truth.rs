@@ -75,7 +75,7 @@ mod tests {
         assert!(!has(Port::Jet, "pulse number"));
     }
 
-    /// On every family, with the same weight as effects of the catalogue.
+    /// Every physics matters on every family, with the same weight as effects of the catalogue.
     #[test]
     fn every_physics_beyond_the_catalogue_matters_in_some_rig() {
         for (seed, name) in (0..).zip(Beyond::NAMES) {

@@ -39,7 +39,7 @@ pub(super) struct Weight {
     before: Vec<f64>,
     /// Sensitivities of the offset and of the flow's constants; orthogonal.
     constants: Vec<Vec<f64>>,
-    /// Sensitivities of memories, orthogonal to these and each other.
+    /// Sensitivities of memories, orthogonal to `constants` and to each other.
     memories: Vec<Vec<f64>>,
 }
 
@@ -100,7 +100,7 @@ impl Weight {
         Ok(least / self.standard_error)
     }
 
-    /// Readings of a plant minus those of the bare one.
+    /// Readings of a plant minus those of the plant without effects.
     fn change(&self, plant: &PlantSpec) -> Result<Vec<f64>, PlantError> {
         let mut run = Rig::new(plant, self.stream.clone())?.play(&self.levels);
         run.iter_mut().zip(&self.before).for_each(|(y, b)| *y -= b);

@@ -45,7 +45,7 @@ pub trait Flow {
 pub struct Published {
     /// Name on the command line and in tables.
     pub name: &'static str,
-    /// Where it was published.
+    /// Reference of the publication.
     pub reference: &'static str,
     /// Effects of the catalogue that are part of its physics and therefore count as correct.
     pub also_right: &'static [&'static str],

@@ -122,7 +122,7 @@ impl Flow for SuppliedValve {
         self.chamber += STEP_S / time * (target - self.chamber);
         self.delayed.push_back(self.chamber.max(0.0).sqrt());
         let j = self.delayed.pop_front().unwrap_or(0.0);
-        // The flow attaches in proportion to the jet, and separates otherwise.
+        // Under a jet the flow attaches in proportion to the jet; without one it separates.
         let time = self.separating_s + (self.attaching_s - self.separating_s) * j.min(1.0);
         self.friction += STEP_S / time * (j - self.friction);
     }

@@ -1,4 +1,4 @@
-//! Flow dynamics beyond one time constant per direction.
+//! Flow dynamics with more than one time constant per direction.
 
 use super::base::BasePlantError;
 
@@ -13,7 +13,7 @@ pub struct PastTerm {
     pub lost: f64,
     /// Smearing time constant of the past (s); 0 for a sharp memory.
     pub smear_s: f64,
-    /// Saturation of the past, limit·tanh(past/limit) (y); infinite for none.
+    /// Limit of limit·tanh(past/limit), a saturation of the past (y); infinite for no saturation.
     pub limit: f64,
 }
 
@@ -45,7 +45,7 @@ pub enum Character {
     /// ṡ = rate·(level − s).
     #[default]
     FirstOrder,
-    /// The level also has Σ (gain − lost·j)·s(t − delay).
+    /// The level contains the additional term Σ (gain − lost·j)·s(t − delay).
     Memory(Vec<PastTerm>),
     /// Inertia: time·s̈ + ṡ = rate·(level − s).
     Inertia {

@@ -13,16 +13,16 @@ pub enum Fault {
     },
     /// The sensor holds its last value for a while.
     FreezingSensor {
-        /// When it freezes (s from the record's start).
+        /// Time at which the sensor freezes (s from the record's start).
         from_s: f64,
-        /// When it works again (s from the record's start).
+        /// Time at which the sensor works again (s from the record's start).
         to_s: f64,
     },
     /// After a long opening the valve closes only half way and stays there before it closes.
     StickingValve {
-        /// Shortest opening after which it sticks (s).
+        /// Shortest opening after which the valve sticks (s).
         after_open_s: f64,
-        /// How long it stays half open (s).
+        /// Time during which the valve stays half open (s).
         stuck_s: f64,
     },
 }
@@ -41,7 +41,7 @@ impl Fault {
         }
     }
 
-    /// A random fault of that name; `None` for an unknown name.
+    /// A random fault with this name; `None` for an unknown name.
     pub fn draw(name: &str, rng: &mut ChaCha8Rng) -> Option<Self> {
         match name {
             "missing-pulse" => Some(Self::MissingPulse {

@@ -41,7 +41,7 @@ pub const SUBSTEP_S: f64 = SAMPLE_PERIOD_S / SUBSTEPS as f64;
 /// Length of the jet's history (s), much longer than any delay.
 const LONGEST_DELAY_S: f64 = 2.5;
 
-/// Time differences below this count as the same instant (s).
+/// Two times with a smaller difference are the same instant (s).
 const SHORTEST_PIECE_S: f64 = 1e-9;
 
 /// A plant for a controller: one command in, one reading out, every millisecond.

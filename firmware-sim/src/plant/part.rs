@@ -49,13 +49,13 @@ pub(crate) struct Surroundings<'a> {
 
 /// A running part, by place.
 pub(crate) enum Part {
-    /// It sets the transport delay.
+    /// The part sets the transport delay.
     Delay(FlowDelay),
-    /// It shapes the jet.
+    /// The part shapes the jet.
     Jet(Box<dyn JetPart>),
-    /// It acts in the flow.
+    /// The part acts in the flow.
     Flow(Box<dyn FlowPart>),
-    /// It acts between flow and reading.
+    /// The part acts between flow and reading.
     Sensor(Box<dyn SensorPart>),
 }
 
@@ -64,9 +64,9 @@ pub(crate) enum Part {
 pub(crate) struct Piece {
     /// Duration (s).
     pub(crate) dt: f64,
-    /// The signal at its start.
+    /// The signal at the piece's start.
     pub(crate) from: f64,
-    /// The signal at its end.
+    /// The signal at the piece's end.
     pub(crate) to: f64,
 }
 
@@ -78,7 +78,7 @@ pub(crate) trait JetPart: Debug + Send + Sync + BoxedJet {
     /// Output at `t`, the end of a piece.
     fn advance(&mut self, t: f64, piece: &Piece) -> f64;
 
-    /// Time of its next spontaneous jump, if nothing else happens (s).
+    /// Time of the part's next spontaneous jump, if nothing else happens (s).
     fn next_event(&self) -> Option<f64> {
         None
     }

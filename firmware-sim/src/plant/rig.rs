@@ -28,7 +28,7 @@ pub enum PlantError {
     Effect(#[from] EffectError),
 }
 
-/// Everything that defines a rig.
+/// Specification of a rig.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlantSpec {
     /// The flow to which the effects are added.

@@ -66,7 +66,7 @@ impl ArrivalClock {
     /// The delay at mean friction `mean` (s).
     pub(crate) fn delay(&self, mean: f64) -> f64 {
         match self.law {
-            // The times of the edges were changed before they reached the valve.
+            // This law has already changed the times of the edges, before they reached the valve.
             FlowDelay::EdgeDependent { .. } => 0.0,
             law => law.at(mean),
         }
@@ -97,7 +97,7 @@ pub(crate) struct EdgeTravel {
 }
 
 impl EdgeTravel {
-    /// `None` for laws that delay the jet as a whole.
+    /// The transport; `None` for laws that delay the jet as a whole.
     pub(crate) fn new(law: FlowDelay) -> Option<Self> {
         match law {
             FlowDelay::EdgeDependent { rise_s, fall_s } => Some(Self {

@@ -57,7 +57,7 @@ impl Desk {
         if self.frames_come() {
             self.since_frames += 1;
         } else if let Some(line) = self.operator.report(controller) {
-            // Dropped if there is no room: it would be outdated.
+            // Without room the line is dropped: it would be outdated later.
             let _ = outbox.offer(line.bytes());
         }
     }

@@ -31,7 +31,7 @@ pub const BATCH: usize = 32;
 pub struct Report {
     /// Steps made.
     pub steps: u32,
-    /// Clock ticks in them.
+    /// Clock ticks in these steps.
     pub ticks: u64,
     /// Most ticks in one step.
     pub most: u32,
@@ -108,7 +108,7 @@ impl<C: Cases> Server<C> {
         }
     }
 
-    /// Takes a byte; returns the bytes to send, usually none.
+    /// Takes a byte; returns the bytes to send, usually no bytes.
     pub fn receive(&mut self, byte: u8) -> &[u8] {
         let Some(result) = self.receiver.receive(byte) else {
             return &[];
@@ -118,7 +118,7 @@ impl<C: Cases> Server<C> {
             Some((*kind, u16::from_le_bytes([*low, *high]), rest))
         });
         let Some((kind, number, rest)) = request else {
-            // The last reply is kept: its request may be repeated.
+            // The last reply is kept, because the host may repeat its request.
             return self.damaged.bytes();
         };
         if self.answered == Some((kind, number)) {
@@ -182,7 +182,7 @@ mod tests {
     use super::*;
     use std::vec::Vec;
 
-    /// Counts its inputs, so that a missing or repeated step is detected.
+    /// Counts the samples that it is given, so that a missing or repeated step is detected.
     struct Counter {
         sum: f32,
         steps: u32,

@@ -30,7 +30,7 @@ pub struct Board {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Session {
     name: u32,
-    /// Samples since its last message.
+    /// Samples since the host's last message.
     silent: u32,
     /// The last executed request, with its result.
     answered: Option<(u16, Done)>,

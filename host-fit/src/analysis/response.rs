@@ -20,9 +20,9 @@ pub struct Pole {
     pub command: u8,
     /// Modulus per sample; below 1 for a stable model.
     pub modulus: f64,
-    /// Time in which its mode decays to 1/e, s.
+    /// Time in which the mode decays to 1/e, s.
     pub time_constant_s: f64,
-    /// Frequency of its oscillation, Hz; 0 for a real pole.
+    /// Frequency of the mode's oscillation, Hz; 0 for a real pole.
     pub hz: f64,
     /// Damping ratio, 0 to 1 for a stable oscillation; 1 for a real pole.
     pub damping: f64,

@@ -13,7 +13,7 @@ pub struct Spectrum {
     pub residual: Vec<f64>,
     /// Spectrum of the measured output about its mean.
     pub output: Vec<f64>,
-    /// Spectrum of white noise with the standard error `y_sd`; none without it.
+    /// Spectrum of white noise with the standard error `y_sd`; `None` without `y_sd`.
     pub noise: Option<f64>,
 }
 
@@ -49,7 +49,7 @@ pub fn spectrum(residuals: &Residuals) -> Spectrum {
                     .map(|(v, w)| (v - mean) * w)
                     .collect();
                 let mut lines = transform.make_output_vec();
-                // Cannot fail: planned for this length.
+                // Cannot fail: the transform was planned for this length.
                 let _ = transform.process(&mut input, &mut lines);
                 for (sum, line) in sum.iter_mut().zip(&lines) {
                     *sum += line.norm_sqr();

@@ -7,7 +7,7 @@ use std::ops::Range;
 const FEWEST: usize = 20;
 /// Share of a record from which its initial state is estimated.
 const SHARE: f64 = 0.05;
-/// Largest share, for processes that are slow compared with the first one.
+/// Largest share of a record, used for processes with long time constants.
 const LONGEST: f64 = 0.25;
 
 /// Free responses of a process to its initial state. The initial state is estimated from the first twentieth of the
@@ -75,7 +75,7 @@ impl InitialState {
         inner(&a[from..both], &b[from..both])
     }
 
-    /// Subtracts from `values` the free response that fits their start best.
+    /// Subtracts from `values` the free response with the least squared error at their start.
     pub(super) fn remove_from(&self, values: &mut [f64]) {
         let share = |column: &Vec<f64>| self.over_the_beginning(column, values);
         let shares: Vec<f64> = self.columns.iter().map(share).collect();

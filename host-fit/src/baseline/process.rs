@@ -10,12 +10,12 @@ use crate::picture::readable_time;
 use serde::Serialize;
 use std::fmt;
 
-/// Time constants up to this many times the longest record.
+/// Longest time constant, as a multiple of the longest record.
 const SLOWEST: f64 = 30.0;
 /// Starting points from which a descent is made.
 const DESCENTS: usize = 3;
 
-/// Time constants below this are not visible in a sampled response, samples.
+/// Shorter time constants, in samples, are not visible in a sampled response.
 const NO_TIME: f64 = 0.05;
 
 /// T·y′ + y = level + gain·u(t − dead time).
@@ -65,7 +65,7 @@ pub struct Recursion {
 impl Recursion {
     fn of(shape: Shape, dead_time: f64, level: f64, gain: f64) -> Self {
         let (a, mut b, delay) = Response::new(shape, dead_time).recursion();
-        // A whole-sample dead time has one input fewer.
+        // A dead time of whole samples needs one coefficient fewer.
         while b.len() > 1 && b.last() == Some(&0.0) {
             b.pop();
         }
@@ -78,7 +78,7 @@ impl Recursion {
     }
 }
 
-/// Both orders on scaled records.
+/// Fits first and second order to scaled records.
 pub(super) fn fit(series: &[Series], longest_dead_time: usize) -> (Option<Fitted>, Option<Fitted>) {
     let longest = series.iter().map(Series::len).max().unwrap_or(0);
     let refiner = Refiner {

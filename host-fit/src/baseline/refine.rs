@@ -79,7 +79,7 @@ impl Refiner<'_> {
         project(&response, self.series, Some(into));
     }
 
-    /// Damped Gauss–Newton steps from `start`, at most `steps` of them.
+    /// At most `steps` damped Gauss–Newton steps from `start`.
     pub(super) fn descend(&self, start: Start, steps: usize) -> Fitted {
         let mut best = self.judge(self.start(&point(start)));
         let mut damping = 1e-3;
@@ -110,7 +110,7 @@ impl Refiner<'_> {
         best
     }
 
-    /// One step that lowers the cost; false if there is none.
+    /// One step that lowers the cost; false if no such step exists.
     fn step(
         &self,
         here: &[f64],

@@ -1,7 +1,7 @@
 //! Responses of a first and of a second order from sample to sample. They are exact for a command that is held
 //! between samples and for a dead time that is not a whole number of samples.
 
-/// Free responses below this share of their initial value have ended.
+/// A free response has ended when it is below this share of its initial value.
 const ENDED: f64 = 1e-9;
 
 /// A linear process of unit static gain, time in samples.

@@ -32,7 +32,7 @@ fn mean_and_scale(values: impl Iterator<Item = f64> + Clone) -> Option<(f64, f64
 }
 
 impl Scaling {
-    /// `None` if u or y is constant.
+    /// The scaled records; `None` if u or y is constant.
     pub(super) fn of(records: &[&Record]) -> Option<Self> {
         let (u_mean, u_scale) = mean_and_scale(records.iter().flat_map(|r| r.u.iter().copied()))?;
         let (y_mean, y_scale) = mean_and_scale(records.iter().flat_map(|r| r.y.iter().copied()))?;

@@ -29,7 +29,7 @@ pub enum BoardError {
     Inverted {
         /// The command of no jet.
         off: f64,
-        /// The command of a full one.
+        /// The command of a full jet.
         full: f64,
     },
     /// More measured channels than converters.
@@ -57,7 +57,7 @@ pub enum BoardError {
     Memory {
         /// Key that needs most of the memory.
         key: String,
-        /// Samples that are stored for this key.
+        /// Samples that the board stores for this key.
         kept: usize,
         /// Memory of the loop, bytes.
         bytes: usize,

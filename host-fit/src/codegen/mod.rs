@@ -67,7 +67,7 @@ pub enum CodegenError {
         /// Name of the effect.
         name: String,
     },
-    /// The model decays too fast for the self-test, or not at all.
+    /// The model's response decays within too few samples for the self-test, or does not decay.
     #[error(
         "the model's response to the reference command is not finite after {samples} samples: it is \
          unstable. Identify it again, with fewer lags or `--objective free-run`."

@@ -150,7 +150,7 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
     }))
 }
 
-/// Fixed against state-dependent delay on the flow simulation; validation FIT of both.
+/// Validation FIT of two models of the flow simulation: with a fixed and with a state-dependent delay.
 fn real_input(
     data: &Path,
     out: &Path,

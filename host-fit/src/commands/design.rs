@@ -304,7 +304,7 @@ impl Args {
         match (self.goal, self.target) {
             (Goal::Track, Some(target)) => format!("law: hold {target}"),
             (Goal::Track, None) => "law: hold".to_owned(),
-            (Goal::Maximise, _) => "law: most friction for the air".to_owned(),
+            (Goal::Maximise, _) => "law: maximise mean friction minus the price of air".to_owned(),
         }
     }
 

@@ -87,7 +87,7 @@ pub(crate) fn experiment_picture(separation: &Separation) -> Picture {
         .map(|(index, (label, y))| LoopRun {
             label,
             y,
-            // All of them get the same command.
+            // All controllers get the same command.
             u: if index == 0 { &experiment.u } else { &[] },
             air: &[],
         })
@@ -171,7 +171,7 @@ pub(crate) struct LoopPicture<'a> {
     pub(crate) title: &'a str,
     /// Whether the air used is shown.
     pub(crate) air: bool,
-    /// y; empty for none.
+    /// Reference of y; empty without a reference.
     pub(crate) reference: &'a [f64],
     /// Names of the controllers with their runs.
     pub(crate) runs: &'a [(&'a str, &'a Trace)],

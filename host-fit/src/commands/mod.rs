@@ -115,7 +115,7 @@ impl Console {
         if let Ok(style) = ProgressStyle::with_template(template) {
             bar.set_style(style);
         }
-        // Ticks need a thread of their own.
+        // Ticks need their own thread.
         if threads::are_given() {
             bar.enable_steady_tick(Duration::from_millis(200));
         }

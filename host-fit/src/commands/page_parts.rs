@@ -338,7 +338,7 @@ fn responses(runs: &[Run<'_>]) -> Option<Figure> {
     ))
 }
 
-/// Columns of [`pole_rows`]: name, and whether it holds numbers.
+/// Columns of [`pole_rows`]: the name, and whether the column holds numbers.
 pub(crate) const POLES: [(&str, bool); 6] = [
     ("model", false),
     ("command", false),

@@ -138,7 +138,7 @@ enum Order {
     Stop,
 }
 
-/// The order in a line, or the permitted ones.
+/// The order in a line, or an error with the permitted orders.
 fn order(line: &str) -> Result<Order, String> {
     let mut words = line.split_whitespace();
     let (word, value, rest) = (words.next(), words.next(), words.next());

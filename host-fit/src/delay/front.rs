@@ -23,7 +23,7 @@ pub(crate) struct Arrival {
 pub(crate) struct Expectation {
     rising: Arrival,
     falling: Arrival,
-    /// +1 if y rises with the command, −1 if it falls.
+    /// +1 if y rises with the command; −1 if y falls.
     gain_sign: f64,
     /// Samples of y used on either side of an arrival.
     pub(crate) reach: usize,
@@ -32,7 +32,7 @@ pub(crate) struct Expectation {
 }
 
 impl Expectation {
-    /// Expected arrival of a response to edges of this direction.
+    /// Expected arrival of a response to edges in the direction of `edge`.
     pub(crate) fn of(&self, edge: Edge) -> Arrival {
         if edge.rising {
             self.rising

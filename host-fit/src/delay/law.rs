@@ -165,7 +165,7 @@ fn gradient(p1: f64, p2: f64, mean_output: f64) -> [f64; 3] {
 /// Least-squares fit at a fixed p2.
 #[derive(Debug, Clone)]
 pub(crate) struct AtRate {
-    /// p0, p1 and, if a further column was given, its coefficient.
+    /// p0, p1 and, with an additional column, the coefficient of that column.
     pub(crate) linear: Vec<f64>,
     pub(crate) rss: f64,
 }

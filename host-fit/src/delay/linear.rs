@@ -162,7 +162,7 @@ impl Series {
     }
 }
 
-/// Filters values by 1 − ρ·z⁻¹; before them they are 0.
+/// Filters values by 1 − ρ·z⁻¹; the values before the first count as 0.
 pub(crate) fn prewhiten(values: &mut [f64], correlation: f64) {
     if correlation > 0.0 {
         for k in (1..values.len()).rev() {

@@ -9,7 +9,7 @@
 //!
 //! A third lag T₃ in series may follow, by the trapezoidal rule between samples: accurate to 1/(12·T₃²) of a response.
 
-/// Below this ratio the second time constant counts as 0.
+/// With a smaller ratio the second time constant counts as 0.
 const FIRST_ORDER: f64 = 1e-5;
 
 /// The changes of the command in one record.
@@ -24,13 +24,13 @@ pub(crate) struct Switching {
 /// One change of the command.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Change {
-    /// Its time, samples; that of the first sample with the new command.
+    /// Time of the first sample with the new command, samples.
     pub(crate) time: f64,
     /// The new command minus that before the record.
     pub(crate) level: f64,
     /// Whether it rose.
     pub(crate) rising: bool,
-    /// Whether it is in the upper half of the range now.
+    /// Whether the new command is in the upper half of the range.
     pub(crate) on: bool,
 }
 
@@ -66,7 +66,7 @@ pub(crate) struct Plant {
     pub(crate) sum: [f64; 2],
     /// b, at least 0.
     pub(crate) ratio: f64,
-    /// T₃, samples; 0 for none.
+    /// T₃, samples; 0 without a third lag.
     pub(crate) third: f64,
 }
 

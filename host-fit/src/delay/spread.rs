@@ -32,7 +32,7 @@ pub(super) fn spread(values: &[f64]) -> Spread {
     }
 }
 
-/// Pearson's correlation; `None` if either side does not vary.
+/// Pearson's correlation; `None` if `a` or `b` is constant.
 pub(super) fn correlation(a: &[f64], b: &[f64]) -> Option<f64> {
     let (ma, mb) = (mean(a), mean(b));
     let (mut ab, mut aa, mut bb) = (0.0, 0.0, 0.0);

@@ -48,7 +48,7 @@ impl Default for DelayOptions {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum DelayMethod {
-    /// One plant describes the records; each edge is shifted on its trajectory.
+    /// One plant is fitted to whole records; the delay of an edge is found by shifting the edge in this fit.
     Trajectory,
     /// Each edge by itself: the kink where y changes course.
     Kink,
@@ -69,7 +69,7 @@ impl DelayMethod {
     }
 }
 
-/// The best-fitting plant of the response, if one fits.
+/// The best-fitting plant of the response.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct ResponsePlant {
     /// 1 or 2.
@@ -93,7 +93,7 @@ pub struct EdgeDelay {
     pub edge: Edge,
     /// Time of the edge, s.
     pub time_s: f64,
-    /// The start of the response, or why it could not be measured.
+    /// The start of the response, or the reason why it is not measurable.
     pub onset: Result<Onset, Unmeasured>,
     /// ỹ (1) at the start of the response, if that was measured.
     pub mean_output: Option<f64>,
@@ -138,14 +138,14 @@ pub struct DelayStudy {
     pub max_delay: usize,
     /// Samples of y on either side of a response, where each edge was located by itself.
     pub reach: usize,
-    /// The plant of the response; `None` if none fits.
+    /// The plant of the response; `None` if no plant fits.
     pub plant: Option<ResponsePlant>,
     /// The dead time over all measured edges of the identify records. Its interval covers the order of the plant, or
     /// the choice of `reach`.
     pub dead_time: Option<DeadTime>,
-    /// The dead time of rising edges alone.
+    /// The dead time of the rising edges.
     pub rising: Option<DeadTime>,
-    /// The dead time of falling edges alone.
+    /// The dead time of the falling edges.
     pub falling: Option<DeadTime>,
     /// The law fitted to the measured edges of the identify records, if it is significant.
     pub law: Option<DelayLawFit>,

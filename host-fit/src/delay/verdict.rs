@@ -1,4 +1,4 @@
-//! The verdict: whether the delay depends on anything.
+//! The verdict on the delay: constant, or dependent on a quantity.
 
 /// The dependence of the measured delays.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]

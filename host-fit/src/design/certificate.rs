@@ -284,7 +284,7 @@ impl Positive {
     fn above(&self, target: f64, [low, high]: [f64; 2]) -> f64 {
         let [open, closed] = self.looks;
         let mixed = usize::from(self.mixes);
-        // The closed valve: y_{n+1} ≤ max(y_n, this).
+        // With a closed valve, y_{n+1} is at most the larger of y_n and `closing`.
         let closing = (self.off.constant + self.off.older() * high) / (1.0 - self.off.newest());
         // Open, may close and stays open: the prediction with the closed valve is at most the target.
         let stays = newest_at(&self.off, &self.off, closed, target, low);
@@ -335,7 +335,7 @@ mod tests {
     #[derive(Clone)]
     struct Flow {
         y: f64,
-        /// Factor of both levels.
+        /// Factor of the two levels.
         gain: f64,
         line: VecDeque<bool>,
     }

@@ -79,7 +79,7 @@ pub struct Optimum {
     pub weighed: Weighed,
     /// Number of pulse trains with a higher mean that were rejected because the model diverges under them.
     pub refused: usize,
-    /// The best mean friction among those, before the divergence.
+    /// The best mean friction of these rejected trains, before their divergence.
     pub refused_mean: Option<f64>,
     /// Largest pole moduli, valve closed and open.
     #[serde(rename = "pole_moduli")]
@@ -99,7 +99,7 @@ pub struct Weighed {
     pub air_price: f64,
     /// Value of the optimum, y.
     pub value: f64,
-    /// Value of steady blowing; `None` if the model diverges.
+    /// Value of steady blowing, y; `None` if the model diverges under it.
     pub steady_value: Option<f64>,
     /// The best pulses that do not diverge, whether or not they are the optimum.
     pub pulses: Option<BestPulses>,

@@ -37,7 +37,7 @@ pub struct PossibleFlow {
 }
 
 impl PossibleFlow {
-    /// Whether the records do not exclude it.
+    /// Whether the plant is consistent with the records.
     #[must_use]
     pub fn is_possible(&self) -> bool {
         self.p_value >= RULES.not_excluded

@@ -65,7 +65,7 @@ rules! {
     worthwhile_saving: f64 = 0.01, "share of the air", "judgement";
     /// A slower switching rate is chosen only if the mean stays within this of the reference.
     paced_offset: f64 = 0.005, "share of the reachable interval", "judgement";
-    /// The air budget may be exceeded on the model by this.
+    /// On the model the air budget may be exceeded by this share.
     air_margin: f64 = 0.02, "share of the air of steady blowing", "judgement";
 
     /// Length of the run on the model that measures the air consumption.
@@ -111,7 +111,7 @@ rules! {
     margin_runs: u32 = 2, "runs", "judgement: limits the time";
     /// Length of a run for the margin.
     margin_run: usize = 6000, "samples", "judgement";
-    /// Start of the scored part of such a run.
+    /// Start of the scored part of a run for the robustness margin.
     margin_from: usize = 2000, "samples", "judgement: the initial transient has decayed";
     /// Largest factor on delay, gain and time constants that is searched.
     margin_reach: f64 = 4.0, "", "judgement";

@@ -47,7 +47,7 @@ pub enum DiagnoseError {
     /// The model cannot be run on the data.
     #[error(transparent)]
     Simulate(#[from] SimulateError),
-    /// The user stopped it.
+    /// The user stopped the diagnosis.
     #[error("the diagnosis was interrupted before it had a result; nothing was written.")]
     Interrupted,
 }

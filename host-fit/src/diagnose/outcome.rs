@@ -26,7 +26,7 @@ pub enum Verdict {
     Unexplained,
 }
 
-/// The verdict and the hypothesis that it is about.
+/// The verdict and the hypothesis to which it applies.
 pub(super) struct Conclusion {
     pub(super) verdict: Verdict,
     /// The final model, inner units.
@@ -127,7 +127,7 @@ pub struct Ranked {
     pub gain_nats: Option<f64>,
     /// Fitted parameters by name.
     pub parameters: BTreeMap<String, ParameterEstimate>,
-    /// Candidates that are not distinguishable from it on the validation records.
+    /// Candidates that the validation records do not distinguish from this one.
     pub confounded_with: Vec<String>,
     /// Whether the gain is significant and above the practical margin.
     pub significant: bool,

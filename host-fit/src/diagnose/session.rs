@@ -33,7 +33,7 @@ pub(super) struct Session<'a> {
 struct Way {
     /// The effects, the most important first.
     order: Vec<&'static Spec>,
-    /// One step for each effect, with those before it.
+    /// One step of the ladder for each effect; a step contains the effects before it.
     rungs: Vec<Rung>,
     /// Number of significant effects. Effects that a second copy of another effect replaces, and effects whose
     /// parameters are not identifiable, are not counted.

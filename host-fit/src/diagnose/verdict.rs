@@ -1,4 +1,4 @@
-//! The verdict: whether anything is missing, and which effects are significant.
+//! The verdict: whether an effect is missing, and which effects are significant.
 
 use super::certificate::Certificate;
 use super::outcome::Conclusion;

@@ -16,7 +16,7 @@ pub enum Coordinate {
     MeanY(f64),
     /// Time since the last rising edge of the command.
     SinceRisingEdge,
-    /// Time since its last falling edge.
+    /// Time since the last falling edge of the command.
     SinceFallingEdge,
     /// Duration of the rest before the last pulse.
     RestBefore,
@@ -108,7 +108,7 @@ impl Coordinate {
         }
     }
 
-    /// One inner unit of it in the user's units.
+    /// One inner unit of the coordinate in the user's units.
     pub(super) fn scale(&self, units: &Units) -> f64 {
         match self {
             Self::MemoryOfU(_) => 1.0,
@@ -139,7 +139,7 @@ impl Coordinate {
         }
     }
 
-    /// Whether its memory is at most `longest`.
+    /// Whether the coordinate's memory is at most `longest`.
     pub(super) fn fits(&self, longest: f64) -> bool {
         match self {
             Self::PastY(t) | Self::MeanY(t) | Self::Blowing(t) => *t <= longest,
@@ -147,7 +147,7 @@ impl Coordinate {
         }
     }
 
-    /// Whether it has a time constant that was chosen from a grid.
+    /// Whether the coordinate has a time constant from a grid.
     pub(super) fn has_time(&self) -> bool {
         self.clone().time_mut().is_some()
     }
@@ -178,7 +178,7 @@ impl Coordinate {
         other
     }
 
-    /// Name of the channel that it reads.
+    /// Name of the channel that the coordinate reads.
     pub(super) fn channel(&self) -> Option<&str> {
         match self {
             Self::Channel(name) => Some(name),

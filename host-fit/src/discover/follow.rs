@@ -174,7 +174,7 @@ impl Finder<'_> {
         Some(without)
     }
 
-    /// The best of some curves for one model.
+    /// Refits one model with each of these curves; returns the best.
     pub(super) fn refitted(&self, beside: &Hypothesis, curves: Vec<Screened>) -> Vec<Candidate> {
         let tried = parallel::some(curves, |curve| self.tried(beside, curve));
         self.finished(tried)

@@ -60,7 +60,7 @@ pub(super) struct Form {
     amplitudes: usize,
     /// g at x for these parameters.
     pub(super) value: fn(f64, &[f64]) -> f64,
-    /// Whether it is defined for x ≥ 0 only.
+    /// Whether the formula is defined for x ≥ 0 only.
     positive: bool,
 }
 

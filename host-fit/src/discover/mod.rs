@@ -59,7 +59,7 @@ impl Default for Options {
 pub struct Glance {
     /// Where a term would act.
     pub place: Place,
-    /// The coordinate it would depend on.
+    /// The coordinate of the term.
     pub coordinate: String,
     /// Predicted reduction of the validation error energy, %.
     pub error_taken_percent: f64,

@@ -32,7 +32,7 @@ pub struct CurvePoint {
 pub struct Alike {
     /// Where it acts.
     pub place: Place,
-    /// The coordinate it depends on.
+    /// The coordinate of the term.
     pub coordinate: String,
 }
 
@@ -50,13 +50,13 @@ pub struct Smallest {
 /// A discovered term. Serialises to an entry of `terms` of `discover --json`.
 #[derive(Clone, Debug, Serialize)]
 pub struct FoundTerm {
-    /// The name of its effect.
+    /// Name of the term's effect.
     pub effect: String,
     /// Where it acts.
     pub place: Place,
-    /// The quantity that it changes, in words.
+    /// The quantity that the term changes, in words.
     pub changes: &'static str,
-    /// The coordinate it depends on.
+    /// The coordinate of the term.
     pub coordinate: String,
     /// Unit of the coordinate.
     pub coordinate_unit: &'static str,
@@ -64,7 +64,7 @@ pub struct FoundTerm {
     pub excess_taken_percent: f64,
     /// Share of the unexplained validation variance that the reported formula or curve explains, %.
     pub formula_taken_percent: f64,
-    /// Family-wise p-value of its gain, over all curves screened.
+    /// Family-wise p-value of the term's gain, over all curves screened.
     pub p_value: f64,
     /// The curve with its band.
     pub curve: Vec<CurvePoint>,
@@ -75,11 +75,11 @@ pub struct FoundTerm {
     /// The formula of the effect: an expression in its coordinate, or a table if no formula fits equally
     /// well.
     pub formula: String,
-    /// Whether it is a formula rather than a table.
+    /// Whether the term is a formula; false for a table.
     pub is_formula: bool,
     /// Parameters of the formula.
     pub parameters: BTreeMap<String, ParameterEstimate>,
-    /// Terms that are not distinguishable from it on these records.
+    /// Terms that these records do not distinguish from this one.
     pub alike: Vec<Alike>,
     /// Share of bootstrap resamples of the validation records in which this place and coordinate fit best, %.
     pub stability_percent: f64,
@@ -137,7 +137,7 @@ pub(super) struct Found {
     pub(super) formula_taken: f64,
     pub(super) resembles: Vec<String>,
     pub(super) alike: Vec<Alike>,
-    /// Terms that are not distinguishable from it, each in its model.
+    /// Terms that these records do not distinguish from this one, each in its model.
     pub(super) rivals: Vec<Candidate>,
     /// Earlier terms that the models of `rivals` contain too.
     pub(super) beside: Vec<Term>,

@@ -16,7 +16,7 @@ rules! {
     refinements: usize = 2, "rounds", "judgement";
     /// Most points of a curve after insertion.
     most_points: usize = 11, "", "judgement: 1.5 times the derivatives of one run";
-    /// Share of the samples beyond the first and the last point.
+    /// Share of the samples outside the first and the last point.
     beyond: f64 = 0.01, "share of the samples", "judgement";
     /// Least distance of a point to the next, relative to its distance from the first point.
     apart: f64 = 0.05, "of the way from the first point", "judgement: rests and times since edges span three decades";

@@ -26,7 +26,7 @@ pub(super) struct Screened {
     pub(super) smallest: f64,
 }
 
-/// The command counts as on above this, inner units.
+/// Above this level the command counts as on, inner units.
 pub(super) const ON: f64 = 0.5;
 /// Bounds of the flow's time constant, of which those of coordinates are multiples, s at 1 kHz.
 const FASTEST_S: f64 = 0.005;
@@ -169,7 +169,7 @@ impl<'a> Context<'a> {
         })
     }
 
-    /// Every curve with one of these entries, the most promising first.
+    /// All curves that enter the model at one of these `entries`, the most promising first.
     pub(super) fn all(&self, entries: &[Entry]) -> Vec<Screened> {
         self.curves(self.coordinates(), entries)
     }

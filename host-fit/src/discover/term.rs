@@ -37,7 +37,7 @@ pub(super) struct Term {
     pub(super) shape: Shape,
     /// Search interval of the coordinate's filter time constant, s, if that is a parameter.
     pub(super) fading: Option<[f64; 2]>,
-    /// The command counts as on above this.
+    /// Above this level the command counts as on.
     pub(super) on: f64,
     /// Reduction of the model's own delay, s: room for a delay that shrinks.
     pub(super) shift: f64,
@@ -95,7 +95,7 @@ impl Term {
         (0..g.len()).map(error).collect()
     }
 
-    /// The name of its effect.
+    /// Name of the term's effect.
     pub(super) fn name(&self) -> String {
         let entry = match self.entry {
             Entry::Jet => "jet",
@@ -212,7 +212,7 @@ impl Term {
         all
     }
 
-    /// Values of its effect's parameters.
+    /// Parameter values of the term's effect.
     pub(super) fn values(&self) -> Vec<f64> {
         self.parameters().iter().map(|p| p.value).collect()
     }
@@ -282,7 +282,7 @@ impl Term {
         other
     }
 
-    /// Its effect file, starting with the lines of `comment`.
+    /// The term as an effect file, which starts with the lines of `comment`.
     pub(super) fn file(&self, comment: &str) -> String {
         let longest = self.shift + RULES.longest_delay_s * self.time;
         let mut text = String::new();

@@ -95,7 +95,7 @@ struct Part {
     /// KᵀK, row-major, and Kᵀe.
     own_gram: Vec<f64>,
     own_right: Vec<f64>,
-    /// Prior precision of w up to its strength.
+    /// Prior precision of w for a strength of 1.
     prior: Vec<f64>,
     /// ln |prior|.
     log_prior: f64,
@@ -186,7 +186,7 @@ fn knots(model: &Model, record: &Record) -> Vec<f64> {
     (0..=count).map(|i| i as f64 * apart).collect()
 }
 
-/// The model with w = 0 at some knots and outside them.
+/// The model with w as parameters at the knots, at first 0; outside the knots w is 0.
 fn with_signal(entry: Entry, model: &Model, knots: &[f64]) -> Option<Model> {
     let apart = knots.get(1).map_or(1.0, |next| next - knots[0]);
     let inside = knots
@@ -260,7 +260,7 @@ impl Part {
         })
     }
 
-    /// Posterior precision JᵀJ + prior at this strength.
+    /// Posterior precision JᵀJ + `strength`·prior.
     fn posterior(&self, strength: f64) -> Cholesky {
         let pairs = self.gram.iter().zip(&self.prior);
         let sum: Vec<f64> = pairs.map(|(gram, prior)| gram + strength * prior).collect();

@@ -54,7 +54,7 @@ pub struct Experiment {
     /// √(Σ(ŷ_A − ŷ_B)²/σ²) of the two closest models, in standard deviations of white noise of the given
     /// size.
     pub separation_sigmas: f64,
-    /// Root mean square difference of those two models over the noise, dB.
+    /// Root mean square difference of the two closest models, divided by the noise, dB.
     pub separation_db: f64,
 }
 
@@ -169,7 +169,7 @@ fn pick(
         .reduce(|best, next| if next.1 > best.1 { next } else { best })
 }
 
-/// √Σ(ŷ_A − ŷ_B)² of the closest two models; −1 if one diverges.
+/// √Σ(ŷ_A − ŷ_B)² of the closest two models; −1 if a model diverges.
 fn separation(models: &[Model], u: &[f64]) -> f64 {
     let runs: Option<Vec<Vec<f64>>> = models.iter().map(|model| run(model, u)).collect();
     let Some(runs) = runs else { return -1.0 };

@@ -18,7 +18,7 @@ pub fn restart_after(model: &Model, records: &[Record]) -> Option<usize> {
     (samples < shortest / 2).then_some(samples)
 }
 
-/// Whether the initial state still matters after this many samples.
+/// Whether the initial state still influences the output after this many samples.
 fn remembers(model: &Model, samples: usize) -> bool {
     let left = |pole: f64| pole.powf(samples as f64);
     model

@@ -1,4 +1,4 @@
-//! The strategy of the delay search: steps, their order, number of restarts.
+//! Strategy of the delay search: its steps, their order, and the number of restarts.
 
 use std::sync::atomic::AtomicBool;
 

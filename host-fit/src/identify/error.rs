@@ -77,7 +77,7 @@ pub enum IdentifyError {
         /// How the search ended.
         stop: StopReason,
     },
-    /// The search was stopped before its first result.
+    /// The user stopped the search before its first result.
     #[error("{stop}, before there was any result. Run again with more evaluations.")]
     NoResult {
         /// How the search ended.

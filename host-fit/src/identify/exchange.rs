@@ -10,7 +10,7 @@ use super::layout::{Column, Delays};
 use super::regression::Regression;
 use crate::linalg::Cholesky;
 
-/// Gains below this share of the residual are rounding errors.
+/// A gain with a smaller share of the residual is a rounding error.
 const NEGLIGIBLE: f64 = 1e-7;
 
 /// A new regressor must keep this share of its length after projection.
@@ -278,7 +278,7 @@ impl<'a> Exchange<'a> {
         &row[first..first + usize::from(self.regression.layout.longest_lag)]
     }
 
-    /// The regressors without those of some slots.
+    /// The columns of all regressors except those of some slots.
     fn kept(&self, delays: &Delays, without: &[Slot]) -> Vec<Column> {
         let layout = &self.regression.layout;
         let keep = |list: List, index: usize| !without.contains(&Slot { list, index });
@@ -461,7 +461,7 @@ pub(crate) fn set(delays: &mut Delays, slot: Slot, lag: u16) {
     };
     match list.get_mut(slot.index) {
         Some(place) => *place = lag,
-        // The slot is free because its lag had become equal to another.
+        // The slot is free because its lag had become equal to another lag.
         None => list.push(lag),
     }
 }

@@ -106,7 +106,7 @@ fn descend(
     Ok(best)
 }
 
-/// Evaluates all points; returns the best if it improves.
+/// Evaluates all points; returns the best one if it is better than the incumbent.
 fn best_of(
     evaluator: &mut Evaluator<'_, FreeRun>,
     points: &[Point],

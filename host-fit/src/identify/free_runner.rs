@@ -23,9 +23,9 @@ const BLOCK: usize = 32;
 pub(crate) enum RunOutcome {
     /// Σ (y − y_sim)² over all records.
     Squared(f64),
-    /// Stopped when the sum reached this value.
+    /// The run was stopped when the sum reached this value.
     AtLeast(f64),
-    /// Diverged after this share of the samples.
+    /// The run diverged after this share of the samples.
     Diverged(f64),
 }
 

@@ -141,7 +141,7 @@ impl Layout {
         point
     }
 
-    /// The canonical point among all with the same delays.
+    /// The canonical one of all points with the same delays.
     pub(crate) fn canonical(&self, point: &[i64]) -> Point {
         let delays = self.delays(point);
         let mut key: Point = delays.state.iter().map(|x| i64::from(*x)).collect();

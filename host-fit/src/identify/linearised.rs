@@ -159,7 +159,7 @@ pub(crate) struct Linearised {
 }
 
 impl Linearised {
-    /// Linearises at `delays` and the solution of their regression, given their run.
+    /// Linearises at `delays` and their regression's solution; `simulated` is their free run.
     pub(crate) fn new(
         signals: &FitSignals,
         layout: &Layout,

@@ -11,7 +11,7 @@ pub struct Refinement {
     /// ε over the identify records before and after.
     #[serde(rename = "identify_epsilon")]
     pub identify: (f64, f64),
-    /// ε over the validate records before and after, if there are any.
+    /// ε over the validate records before and after; `None` without validate records.
     #[serde(rename = "validate_epsilon")]
     pub validate: Option<(f64, f64)>,
     /// Whether the refined coefficients were kept: the validation ε fell or, without validation records, the

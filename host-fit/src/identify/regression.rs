@@ -170,7 +170,7 @@ impl Regression {
         }
     }
 
-    /// All weights that candidates with these input delays need.
+    /// Weights of all tables that candidates with these input delays need.
     fn needed(&self, ticks: &[i64]) -> Vec<Which> {
         let mut needed = Vec::new();
         for l in 1..=ticks.len() {

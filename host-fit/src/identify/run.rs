@@ -43,7 +43,7 @@ pub struct Identified {
     pub wall_time: Duration,
     /// Why the search ended.
     pub stop: StopReason,
-    /// The refinement, where one was made.
+    /// The refinement; `None` without refinement.
     pub refinement: Option<Refinement>,
     /// Largest pole magnitude of the recursion without blowing.
     pub pole_off: f64,

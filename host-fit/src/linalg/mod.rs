@@ -9,7 +9,7 @@ use faer::linalg::matmul::matmul;
 use faer::linalg::matmul::triangular::{self, BlockStructure};
 use faer::{Accum, Mat, MatMut, MatRef, Par, Side};
 
-/// Singular values below this share of the largest count as zero.
+/// A singular value with a smaller share of the largest one counts as zero.
 const RANK_TOLERANCE: f64 = 1e-12;
 
 /// A direction with less than this share of the information of the best one counts as not identified.

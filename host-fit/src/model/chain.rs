@@ -9,7 +9,7 @@ use model_core::{Real, pairs};
 
 /// An effect of the catalogue or a user's own.
 #[derive(Clone, Debug)]
-#[allow(clippy::large_enum_variant, reason = "a handful per model")]
+#[allow(clippy::large_enum_variant, reason = "a model has few effects")]
 pub enum HostEffect<T: Real> {
     /// An effect of the catalogue, `model_core::effects`.
     Catalogue(AnyEffect<T, Ring<T>>),
@@ -19,7 +19,7 @@ pub enum HostEffect<T: Real> {
 
 /// The state of a [`HostEffect`].
 #[derive(Clone, Debug)]
-#[allow(clippy::large_enum_variant, reason = "a handful per model")]
+#[allow(clippy::large_enum_variant, reason = "a model has few effects")]
 pub enum HostState<T: Real> {
     /// State of an effect of the catalogue.
     Catalogue(AnyState<T, Ring<T>>),

@@ -47,7 +47,7 @@ impl CommandRange {
         self.off + share * (self.full - self.off)
     }
 
-    /// Whether both are finite and differ.
+    /// Whether the two commands are finite and differ.
     #[must_use]
     pub fn is_valid(&self) -> bool {
         let size = self.full - self.off;

@@ -99,7 +99,7 @@ impl Delay {
         }
     }
 
-    /// Whether another follows the same law.
+    /// Whether `other` follows the same law.
     #[must_use]
     pub fn is_alike(&self, other: &Self) -> bool {
         match (self, other) {
@@ -109,7 +109,7 @@ impl Delay {
         }
     }
 
-    /// Whether it is a law of the averaged y, not a constant.
+    /// Whether the delay depends on the averaged y.
     #[must_use]
     pub fn follows_y(&self) -> bool {
         match self {
@@ -235,7 +235,7 @@ mod tests {
             delays: vec![49, 98],
         };
         assert_eq!(fixed.factors(), [1.0, 2.0]);
-        // A delay for the inputs of another one.
+        // A delay with the factors of another delay.
         let own = constant.for_inputs_of(&fixed);
         assert_eq!(own.factors(), [1.0, 2.0]);
         let own = Delay::Fixed { delays: vec![9] }.for_inputs_of(&fixed);

@@ -26,7 +26,7 @@ pub enum ModelError {
         /// Why.
         source: std::io::Error,
     },
-    /// It is not a model file of this version.
+    /// The file has another format version.
     #[error(
         "{place}: `format_version` is {found}, but this tool reads version {FORMAT_VERSION}. \
              Identify the model again with this tool, or use the version that wrote it."
@@ -45,7 +45,7 @@ pub enum ModelError {
         /// The problem, with line and key.
         problem: String,
     },
-    /// Parts of it contradict each other.
+    /// Two parts of the file contradict each other.
     #[error("{place}: key `{key}`: {problem}. Correct the key, or identify the model again.")]
     Inconsistent {
         /// The file.
@@ -58,7 +58,7 @@ pub enum ModelError {
     /// A user effect in the file was refused.
     #[error(transparent)]
     Definition(#[from] DefinitionError),
-    /// It could not be written.
+    /// The file could not be written.
     #[error(transparent)]
     Output(#[from] OutputError),
 }

@@ -53,7 +53,7 @@ pub struct Track {
     pub look_ahead: u16,
     /// Share of a residual that corrects the estimate.
     pub observer: f64,
-    /// Share of a prediction error that enters its average, per sample.
+    /// Weight of a prediction error in the average of these errors, per sample.
     pub bias_rate: f64,
     /// Integral action, 1 per sample.
     pub integral_rate: f64,

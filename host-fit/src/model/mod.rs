@@ -72,7 +72,7 @@ pub struct Model {
     pub definitions: Vec<&'static Definition>,
     /// Records and options of the identification.
     pub training: Training,
-    /// The control law designed for the model, if one was.
+    /// The control law designed for the model; `None` without a law.
     pub law: Option<Law>,
 }
 
@@ -103,7 +103,7 @@ pub enum Start {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Added {
-    /// Its name in the catalogue, or of the user's effect.
+    /// Name of the effect in the catalogue, or of the user's effect.
     pub name: String,
     /// Parameter values in the order and units of the catalogue.
     pub parameters: Vec<f64>,
@@ -278,7 +278,7 @@ impl Model {
         model
     }
 
-    /// The effects among its candidates that are measured inputs.
+    /// The measured inputs among the model's candidates.
     pub(crate) fn measured_inputs(&self) -> impl Iterator<Item = &'static Spec> {
         let inputs = self
             .definitions

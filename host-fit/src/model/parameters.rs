@@ -8,7 +8,7 @@ use model_core::effects::ZERO_OFFSET;
 /// Kind of a coordinate of the parameter vector.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Kind {
-    /// d, a_i, b_l or c_jl: the recursion is linear in it.
+    /// d, a_i, b_l or c_jl, which are linear in the recursion.
     Linear,
     /// A parameter of the delay law.
     Delay(Parameter),
@@ -35,7 +35,7 @@ impl Coordinate {
         }
     }
 
-    /// Whether the free run is differentiable with respect to it.
+    /// Whether the free run is differentiable with respect to the coordinate.
     #[must_use]
     pub fn is_smooth(&self) -> bool {
         self.parameter()

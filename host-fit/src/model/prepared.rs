@@ -21,7 +21,7 @@ pub struct Prepared<T: Real> {
     a: Vec<T>,
     b: Vec<T>,
     c: Vec<T>,
-    /// `None` only during construction.
+    /// Cached result of `pace`; `None` only during construction.
     pace: Option<Pace<T>>,
     delay: AnyDelay<T>,
     /// Whether the delay depends on ỹ.
@@ -88,7 +88,7 @@ pub enum AnyDelay<T: Real> {
         law: AnyTransport<T>,
         /// One factor for each input.
         factors: Vec<T>,
-        /// Whether its delays are rounded to whole samples.
+        /// Whether the delays are rounded to whole samples.
         rounded: bool,
         /// For each input the nearest and the farthest sample that it can read, if known.
         ranges: Vec<Option<(usize, usize)>>,

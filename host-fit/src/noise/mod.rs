@@ -149,7 +149,7 @@ pub struct Metric {
     log_determinant: f64,
 }
 
-/// An error or a derivative in this metric.
+/// An error or a derivative, whitened with this metric.
 #[derive(Clone, Debug)]
 pub struct Whitened {
     /// The whitened series, unit variance per sample.
@@ -159,7 +159,7 @@ pub struct Whitened {
 }
 
 impl Metric {
-    /// A series of the record in this metric.
+    /// A series of the record, whitened with this metric.
     #[must_use]
     pub fn whiten(&self, series: &[f64]) -> Whitened {
         let root = self.scale.sqrt();

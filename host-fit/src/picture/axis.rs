@@ -14,7 +14,7 @@ pub(super) struct Axis {
     decades: bool,
 }
 
-/// A tick: its position and label.
+/// A tick of an axis.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Tick {
     pub(super) value: f64,

@@ -102,7 +102,7 @@ pub struct Picture {
 }
 
 impl Picture {
-    /// Both documents for a page, whose style shows the one that fits.
+    /// Both drawings for a page; the page's style shows the one for the width of the window.
     #[must_use]
     pub fn html(&self) -> String {
         let Self { wide, narrow } = self;

@@ -36,7 +36,7 @@ pub struct ClosedLoop<'a> {
     pub reference: &'a [f64],
     /// Runs to compare, the most important last (drawn on top).
     pub runs: &'a [LoopRun<'a>],
-    /// Part to show, from and to, s; everything when `None`.
+    /// Part to show, from and to, s; `None` shows the whole run.
     pub window_s: Option<(f64, f64)>,
 }
 

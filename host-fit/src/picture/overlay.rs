@@ -33,7 +33,7 @@ pub struct Overlay<'a> {
     pub u: &'a [f64],
     /// Measured output.
     pub y: &'a [f64],
-    /// Standard error of the measured output, drawn as ±2 of it.
+    /// Standard error of the measured output; a band of ±2 standard errors is drawn.
     pub y_sd: Option<&'a [f64]>,
     /// Smallest value over the repeats; with `y_max` the band around y (instead of ±2 `y_sd`).
     pub y_min: Option<&'a [f64]>,
@@ -216,7 +216,7 @@ pub(super) fn part(values: &[f64], range: &Range<usize>) -> impl Iterator<Item =
         .copied()
 }
 
-/// Smallest range that contains both.
+/// Smallest range that contains `a` and `b`.
 pub(super) fn union(a: Option<(f64, f64)>, b: Option<(f64, f64)>) -> Option<(f64, f64)> {
     match (a, b) {
         (Some(a), Some(b)) => Some((a.0.min(b.0), a.1.max(b.1))),

@@ -63,7 +63,7 @@ impl Clock {
         if range.is_empty() { 0..length } else { range }
     }
 
-    /// Axis over `range`, the last sample held for its period.
+    /// Axis over `range`; the last sample lasts for one period.
     pub(super) fn axis(&self, range: &Range<usize>) -> Axis {
         Axis::linear(Some((self.time(range.start), self.time(range.end))))
     }

@@ -15,11 +15,11 @@ pub struct Candidate<'a> {
     pub name: &'a str,
     /// Validation RMSE, free run with the candidate added and everything refitted, unit of y.
     pub rmse: f64,
-    /// Lower end of the interval of `rmse`; NaN for none.
+    /// Lower end of the interval of `rmse`; NaN without an interval.
     pub low: f64,
     /// Upper end of the interval.
     pub high: f64,
-    /// Whether it is named as missing.
+    /// Whether the effect is named as missing.
     pub accepted: bool,
     /// A short note at the right, for example `"p < 0.001"`; empty for none.
     pub note: &'a str,
@@ -115,7 +115,7 @@ pub fn ranking(plot: &Ranking<'_>) -> Picture {
         };
         panel.uprights(canvas);
         let rows = || order.iter().enumerate();
-        // Where names stand above, dots have the lower half of their row.
+        // Where the name is above the dot, the dot is in the lower half of the row.
         let middle = |row: usize| panel.top + 4.0 + pitch * (row as f64 + 1.0) - 0.5 * ROW;
         for (row, _) in rows() {
             let ends = [panel.left, panel.left + panel.width].map(|x| (x, middle(row)));

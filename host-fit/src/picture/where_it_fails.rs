@@ -41,14 +41,14 @@ pub struct WhereItFails<'a> {
     pub title: &'a str,
     /// Label of the vertical axes with the unit of y; empty means "RMS residual".
     pub y_label: &'a str,
-    /// One panel each, in this order.
+    /// Panels, in this order.
     pub views: &'a [FailureView<'a>],
 }
 
 /// Explained share below which no bin is marked.
 const WORTH_MARKING: f64 = 0.05;
 const PANEL: f64 = 118.0;
-/// Name of the coordinate, and below it its share.
+/// Height for the name of the coordinate and, below it, the explained share.
 const HEAD: f64 = 48.0;
 const TICKS: f64 = 26.0;
 

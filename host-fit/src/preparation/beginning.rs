@@ -62,7 +62,7 @@ impl Rest {
 
 /// A straight-line fit of y to a constant and one shape.
 struct Shape {
-    /// Sum of squares that it leaves.
+    /// Sum of squares of the residual.
     left: f64,
     /// Sum of squares of the motion that the fit describes.
     motion: f64,
@@ -554,7 +554,7 @@ mod tests {
         assert_eq!((beginnings[0].command, beginnings[0].follow), (0.0, 0));
         let edge_before = beginnings[1];
         assert!(edge_before.command == 0.0 && edge_before.rest > 0 && edge_before.follow > 20);
-        // Without further edges only its response can be scored.
+        // Without further edges only the response to the first can be scored.
         let short = Record {
             u: records[1].u[..200].to_vec(),
             ..records[1].clone()

@@ -38,7 +38,7 @@ pub struct Preparation {
     pub zero: f64,
     /// Whether every record begins at rest without jet.
     pub at_rest: bool,
-    /// The offset that differs between records, if it does.
+    /// The offset of the sensor, if it differs between records.
     pub moving_zero: Option<MovingZero>,
     /// Whether y responds to the command of its own row; u of `records` is then moved up by one row.
     pub own_row: bool,
@@ -76,7 +76,7 @@ impl Preparation {
         }
     }
 
-    /// Prepares `records` without correcting their offsets beyond those of their rests.
+    /// Prepares `records`; of the offsets only those of rests are corrected.
     fn as_read(records: &[Record]) -> Self {
         let reference = FirstOrder::fitted(records);
         let mut beginnings: Vec<Beginning> = records

@@ -232,7 +232,7 @@ pub struct MovingZero {
     zeros: f64,
     /// Variance of noise that is constant throughout a rest.
     slower: f64,
-    /// Whether it was found from rests, instead of whole records.
+    /// True if the offset was found from rests, false if from whole records.
     by_rests: bool,
 }
 
@@ -631,7 +631,7 @@ mod tests {
         assert_eq!((&*moving.lowest.0, &*moving.highest.0), ("a", "b"));
         let apart = moving.highest.1 - moving.lowest.1;
         assert!((apart - 0.05).abs() < 0.005, "{apart}");
-        // Without them nothing moves.
+        // In the corrected records no offset moves.
         assert!(MovingZero::by_response(&tared).is_none());
         assert!(MovingZero::by_response(&records([0.3; 3], false)).is_none());
         // A misfit of the response may look like an offset.

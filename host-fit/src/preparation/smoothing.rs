@@ -9,7 +9,7 @@ const HALVES: [usize; 6] = [2, 4, 8, 16, 32, 64];
 /// A parabola over this many samples on both sides, fitted by least squares.
 struct Parabola {
     value: f64,
-    /// Weight of the sample's own value in it.
+    /// Weight of the sample's own value in the smoothed value.
     leverage: f64,
 }
 

@@ -50,7 +50,7 @@ pub enum FailureCoordinate {
 }
 
 impl FailureCoordinate {
-    /// Unit of its values; empty for a pure number and for channels.
+    /// Unit of the coordinate; empty for a pure number and for channels.
     #[must_use]
     pub fn unit(&self) -> &'static str {
         match self {
@@ -88,7 +88,7 @@ impl FailureCoordinate {
         }
     }
 
-    /// Whether it is the position of a pulse in a cycle.
+    /// Whether the coordinate is the position of a pulse in a cycle.
     #[must_use]
     pub fn is_cycle(&self) -> bool {
         matches!(self, Self::PulseInCycle { .. })

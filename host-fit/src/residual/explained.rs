@@ -22,13 +22,13 @@ pub(super) struct Errors {
 /// How the error depends on a coordinate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Dependence {
-    /// The mean error depends on it.
+    /// The mean error depends on the coordinate.
     Mean,
-    /// The ratio of error to y depends on it.
+    /// The ratio of error to y depends on the coordinate.
     Proportion,
     /// The mean error depends on it and on the dwell before the edge.
     Dwell,
-    /// The size of the error depends on it, but not the sign.
+    /// The size of the error depends on the coordinate, but not the sign.
     Size,
 }
 
@@ -264,7 +264,7 @@ struct Learned {
     line: (f64, f64),
     means: Vec<f64>,
     lines: Vec<(f64, f64)>,
-    /// Bins with more than their share of the error energy.
+    /// Bins that contain a larger share of the error energy than of the samples.
     rich: Vec<bool>,
 }
 

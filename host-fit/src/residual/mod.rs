@@ -47,7 +47,7 @@ pub struct Where {
     /// Mean error y − y_sim in that interval, in y.
     #[serde(skip)]
     pub bias: f64,
-    /// How the error depends on the coordinate; none if it does not.
+    /// Dependence of the error on the coordinate; `None` if it is not significant.
     #[serde(skip)]
     pub dependence: Option<Dependence>,
     /// The smallest interval with three quarters of the unexplained variance.
@@ -68,7 +68,7 @@ pub struct Interval {
     pub from: f64,
     /// Upper end.
     pub to: f64,
-    /// Share of the unexplained variance in it, 0–1.
+    /// Share of the unexplained variance in the bin, 0–1.
     pub share: f64,
     /// Share of the samples in it, 0–1; for a frequency band, share of the energy of y.
     pub of_samples: f64,

@@ -1,4 +1,4 @@
-//! The samples behind each bar of "where it fails".
+//! Samples in each bar of "where it fails".
 
 use super::binned::values;
 use super::{Failures, Where};

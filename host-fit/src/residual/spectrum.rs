@@ -67,7 +67,7 @@ pub(super) fn by_frequency(errors: &Errors, excess: f64) -> Option<Where> {
     };
     let mut gains = vec![0.0; pieces.len()];
     for half in 0..2 {
-        // Trained on every other segment, tested on the remaining ones.
+        // Every second segment is for estimation, the others are for the test.
         let rich: Vec<usize> = (0..bands)
             .filter(|b| {
                 let mut learning = pieces.iter().skip(half).step_by(2);

@@ -23,7 +23,7 @@ pub struct Snapshot {
     pub evaluations: usize,
     /// Most evaluations allowed.
     pub budget: usize,
-    /// Best value so far; infinite before the first finite one.
+    /// Best value so far; infinite before the first finite value.
     pub best: f64,
 }
 

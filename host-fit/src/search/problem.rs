@@ -5,9 +5,9 @@ use super::variable::{Point, Variable};
 /// Outcome of one evaluation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Evaluation {
-    /// The exact value; `f64::INFINITY` for a point that has none.
+    /// The exact value; `f64::INFINITY` for a point without a value.
     Value(f64),
-    /// The evaluation stopped early: the value is at least this.
+    /// A lower bound of the value, because the evaluation stopped early.
     AtLeast(f64),
 }
 

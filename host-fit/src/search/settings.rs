@@ -9,7 +9,7 @@ pub struct Settings {
     pub evaluations: usize,
     /// Seed of every random choice: the same seed gives the same result bit for bit.
     pub seed: u64,
-    /// Threads that evaluate, at least 1. They do not change the result.
+    /// Number of threads that evaluate, at least 1. The result does not depend on it.
     pub threads: usize,
     /// Poll directions.
     pub poll: PollKind,
@@ -20,7 +20,7 @@ pub struct Settings {
 /// Number of directions of a poll.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PollKind {
-    /// Both signs of an orthogonal basis: 2n points.
+    /// All vectors of an orthogonal basis with both signs: 2n points.
     Ortho2N,
     /// The more promising half of them and minus their sum: n + 1 points.
     OrthoNPlus1,

@@ -15,7 +15,7 @@ pub struct Around<'a> {
     pub point: &'a [i64],
     /// Value of the objective at the incumbent.
     pub value: f64,
-    /// The mesh around it.
+    /// The mesh around the incumbent.
     pub mesh: &'a Mesh,
     /// Displacement of the last success, in ticks.
     pub last_step: Option<&'a [i64]>,

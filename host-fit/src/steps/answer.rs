@@ -43,7 +43,7 @@ pub struct Answer {
     pub evidence: String,
     /// The confidence with its test; empty if nothing was tested.
     pub confidence: String,
-    /// The next command; empty if there is none.
+    /// The next command; empty without one.
     pub next: String,
     /// Limitations of the result, one each.
     pub notes: Vec<String>,

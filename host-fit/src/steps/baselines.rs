@@ -49,7 +49,7 @@ impl Beside {
         }
     }
 
-    /// A note if the best baseline has a higher FIT than this.
+    /// A note if the best baseline has a higher FIT.
     pub(super) fn better_than(&self, fit_percent: f64) -> Option<String> {
         let (name, best) = self.fits.best()?;
         let behind = best - fit_percent;

@@ -10,23 +10,23 @@ use serde::Serialize;
 pub struct EffectEntry {
     /// Name of the effect.
     pub name: &'static str,
-    /// Where it acts: `jet`, `delay`, `flow` or `sensor`.
+    /// Place of the effect: `jet`, `delay`, `flow` or `sensor`.
     pub place: &'static str,
     /// The effect in one line.
     pub summary: &'static str,
     /// Equation of the effect.
     pub equation: &'static str,
-    /// The measured channel that it needs, if any.
+    /// The measured channel that the effect needs, if any.
     pub channel: Option<&'static str>,
     /// Literature source.
     pub source: &'static str,
-    /// The behaviour of the records that it describes.
+    /// The behaviour of the records that the effect describes.
     pub shows: Option<String>,
-    /// The bench check that would confirm it.
+    /// The bench check that confirms the effect.
     pub check: Option<&'static str>,
-    /// Candidates with a similar residual, and how to distinguish them.
+    /// Candidates with a similar residual, and the measurement that distinguishes them.
     pub confused_with: Option<&'static str>,
-    /// Whether it is a base term, which is never reported as missing.
+    /// Whether the effect is a base term, which is never reported as missing.
     pub base: bool,
     /// Parameters of the effect.
     pub parameters: Vec<ParameterEntry>,

@@ -21,7 +21,7 @@ use closed_loop::Controlled;
 pub enum DesignRequest {
     /// Hold the friction at a value.
     Track(TrackRequest),
-    /// The most friction for the air.
+    /// The highest mean friction minus the price of the air.
     Maximise(MaximiseRequest),
 }
 

@@ -30,9 +30,9 @@ pub struct Finding {
     pub diagnosis: Diagnosis,
     /// The answer: verdict, evidence, confidence, next command.
     pub answer: Answer,
-    /// Where the final model still fails; none if its free run diverges.
+    /// "Where it fails" of the final model; `None` if its free run diverges.
     pub failures: Option<Failures>,
-    /// The error message if it diverges.
+    /// The error message if the free run of the final model diverges.
     pub unstable: Option<String>,
     /// Indicators of the final model.
     pub scores: Scores,
@@ -43,7 +43,7 @@ pub struct Finding {
     /// First-order prediction for a term outside the catalogue; computed if the catalogue explains too
     /// little.
     pub beyond: Option<Glance>,
-    /// Detectable size of each effect; reported if nothing is missing.
+    /// Detectable size of each effect; reported if no effect is missing.
     pub detectable: Vec<Detectable>,
     /// The final validation error, y rms, if it is not that of whole free runs over `validate` records.
     pub judged_rmse: Option<f64>,

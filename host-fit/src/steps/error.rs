@@ -22,7 +22,7 @@ pub enum StepError {
     /// Raw recordings cannot be averaged.
     #[error(transparent)]
     Average(#[from] AverageError),
-    /// The recordings are valid, but their excitation is not sufficient.
+    /// The recordings are valid, but their excitation is insufficient.
     #[error(transparent)]
     Excitation(#[from] ExcitationError),
     /// An error in the model file.

@@ -28,7 +28,7 @@ pub struct Extension {
     pub effects: Vec<String>,
     /// Parameters of the effects by name; preceded by the effect's name if several were added.
     pub parameters: BTreeMap<String, ParameterEstimate>,
-    /// Validation indicators before; none if the model diverges on these records.
+    /// Validation indicators before; `None` if the given model diverges on these records.
     pub before: Option<Indicators>,
     /// Validation indicators after.
     pub after: Option<Indicators>,

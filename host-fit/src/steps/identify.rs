@@ -128,7 +128,7 @@ pub struct Identification {
     /// Why the search ended.
     #[serde(serialize_with = "stop_name")]
     pub stop: StopReason,
-    /// The refinement on the free run, if one was made.
+    /// The refinement on the free run; `None` without refinement.
     pub refinement: Option<Refinement>,
     /// Largest pole magnitudes of the recursion, closed and open.
     pub poles: [f64; 2],
@@ -147,7 +147,7 @@ pub struct IdentifiedDelays {
     pub product: Vec<u16>,
     /// Fixed input delays, samples; empty under a law.
     pub input: Vec<u16>,
-    /// Factors of the delay law; empty without one.
+    /// Factors of the delay law; empty without a law.
     pub factors: Vec<f64>,
     /// Parameters of the delay law, in the order of its card; none for fixed delays.
     pub law: Option<Vec<f64>>,

@@ -1,4 +1,4 @@
-//! The steps from recordings to constants on a board, one function each.
+//! Steps from recordings to constants on a board; each is a function.
 //!
 //! | step | from | to |
 //! |---|---|---|

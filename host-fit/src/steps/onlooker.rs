@@ -9,7 +9,7 @@ use crate::search::{Progress, Snapshot};
 /// Observer of a running step, which may also interrupt it. The unit type `()` ignores everything and never
 /// interrupts.
 pub trait Onlooker: Sync {
-    /// A task starts; its name.
+    /// A task with this name starts.
     fn begins(&self, _what: &str) {}
     /// Progress of the task, in words.
     fn now(&self, _what: &str) {}
@@ -22,7 +22,7 @@ pub trait Onlooker: Sync {
     fn ends(&self) {}
     /// A warning before a long computation.
     fn hears(&self, _warning: &str) {}
-    /// When set, the step returns its best result so far.
+    /// When this flag is set, the step returns its best result so far.
     fn interrupt(&self) -> &AtomicBool;
 }
 

@@ -154,7 +154,7 @@ const CHECKS: [(&str, &str); 21] = [
     ),
     (
         "quadratic-drag",
-        "repeat one step at several amplitudes: the decay slows at small ones",
+        "repeat one step at several amplitudes: at small amplitudes the decay is slower",
     ),
     (
         "vortex-shedding",
@@ -186,7 +186,7 @@ const CHECKS: [(&str, &str); 21] = [
     ),
 ];
 
-/// Candidates with a similar residual, and how to distinguish them.
+/// Candidates with a similar residual, and the measurement that distinguishes them.
 const CONFUSED: [(&str, &str); 12] = [
     (
         "valve-lag",

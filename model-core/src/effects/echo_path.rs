@@ -12,8 +12,7 @@ use core::marker::PhantomData;
 /// [`Echo`] with d of at most `LEN` − 2 samples.
 pub type EchoPath<T, const LEN: usize> = Echo<T, DelayLine<T, LEN>>;
 
-/// j(t) = v(t) + g·v(t − d), with v stored in `M`, for d of at most [`LONGEST_BUFFER`] − 2 samples; without echo
-/// beyond.
+/// j(t) = v(t) + g·v(t − d), with v stored in `M`. There is no echo if d exceeds [`LONGEST_BUFFER`] − 2 samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Echo<T, M> {
     gain: T,

@@ -116,14 +116,14 @@ macro_rules! catalogue {
         /// Any effect of the catalogue except the delay laws, chosen at run time. Effects with a memory of a signal
         /// store it in `M`.
         #[derive(Clone, Copy, Debug)]
-        #[allow(clippy::large_enum_variant, reason = "a handful per model, on the host")]
+        #[allow(clippy::large_enum_variant, reason = "a model on the host has few effects")]
         pub enum AnyEffect<T: Real, M> {
             $(#[doc = concat!("`", stringify!($file), "`")] $effect($type),)+
         }
 
         /// The state of [`AnyEffect`].
         #[derive(Clone, Debug)]
-        #[allow(clippy::large_enum_variant, reason = "a handful per model, on the host")]
+        #[allow(clippy::large_enum_variant, reason = "a model on the host has few effects")]
         pub enum AnyState<T: Real, M: Reaching<T>> {
             $(#[doc = concat!("of `", stringify!($file), "`")] $effect(<$type as Effect<T>>::State),)+
         }

@@ -112,7 +112,7 @@ impl Column {
             notes: Vec::new(),
         };
         if self.kind == Some(Kind::Stamps) {
-            // Only the row itself can explain a missing stamp.
+            // For a missing stamp the message quotes the row.
             let at = |row: usize| (lines.get(row).copied().unwrap_or(0), printable(&text(row)));
             if let Some(row) = self.gap {
                 return Err(unread(at(row)));

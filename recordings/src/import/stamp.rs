@@ -427,7 +427,7 @@ mod tests {
         assert_eq!(days_from_civil(2024, 9, 17), Some(19_983));
     }
 
-    /// 5 June and 6 June, not 6 May and 6 June; 13 can only be a day.
+    /// The order with the shorter record applies: 5 and 6 June, not 6 May and 6 June. A 13 can only be a day.
     #[test]
     fn the_order_of_day_and_month_is_that_of_the_shorter_record() {
         assert_eq!(

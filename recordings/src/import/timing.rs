@@ -14,7 +14,7 @@ const SINCE_1970: f64 = 1e9;
 
 /// The samples' times.
 pub(super) struct Timing<'a> {
-    /// The variables used for it, which are not channels.
+    /// The variables that contain the time; they are not imported as channels.
     pub(super) variables: Vec<&'a Variable>,
     /// Time of the first sample, s.
     pub(super) t0: f64,

@@ -11,7 +11,7 @@ physics! {
     parameters(_, rng) {
         /// Strength.
         gain ["-", FINITE] = rng.random_range(0.6..1.2);
-        /// Time constant of its decay, τ.
+        /// Time constant of the vortex's decay, τ.
         decay_time ["s", TIME] = log_uniform(rng, 0.035, 0.080);
         /// Roll-up time constant, τ_r.
         rise_time ["s", TIME] = log_uniform(rng, 0.003, 0.008);

@@ -13,7 +13,7 @@ physics! {
     parameters(_, rng) {
         /// Strength of the echo.
         gain ["-", FINITE] = signed(rng, 0.20, 0.45);
-        /// Additional delay of its start.
+        /// Additional delay until the echo starts.
         echo_delay ["s", TRAVEL] = log_uniform(rng, 0.060, 0.300);
         /// Smearing time constant.
         smear_time ["s", TIME] = log_uniform(rng, 0.008, 0.030);

@@ -14,7 +14,7 @@ physics! {
     parameters(_, rng) {
         /// Convection time at the mean free stream.
         way ["s", TRAVEL] = rng.random_range(0.030..0.060);
-        /// Exponent; 1 if everything moves with the stream.
+        /// Exponent; 1 if everything in the line moves with the stream.
         exponent ["-", FINITE] = rng.random_range(1.0..2.5);
     }
     part(law, surroundings) {

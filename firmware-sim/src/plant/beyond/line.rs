@@ -12,7 +12,7 @@ pub(super) trait LineLaw: Clone + Debug + Send + Sync + 'static {
     fn takes(&self, pulses: &Pulses, t: f64) -> f64;
 }
 
-/// The line with this law.
+/// A line in the jet path with this law.
 pub(super) fn line(law: impl LineLaw) -> Part {
     Part::Jet(Box::new(Line {
         law,

@@ -72,7 +72,7 @@ pub struct Truth {
     /// Coordinates in the words of `discover`: the first is the true one, the others are equivalent for given
     /// commands and readings. A time in brackets is the rig's (s); without one any time is accepted.
     pub coordinates: Vec<String>,
-    /// The region outside of which it has no effect, if limited.
+    /// The only region in which the term acts; `None` if it acts everywhere.
     pub region: Option<Region>,
 }
 

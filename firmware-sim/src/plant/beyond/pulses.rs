@@ -49,7 +49,7 @@ impl Pulses {
         self.number
     }
 
-    /// Length of the rest before the last one (s).
+    /// Length of the rest before the last pulse (s).
     pub(super) fn rest_before(&self) -> f64 {
         self.rest_before
     }

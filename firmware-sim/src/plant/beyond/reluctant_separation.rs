@@ -12,7 +12,7 @@ physics! {
     parameters(_, rng) {
         /// Initial relative reduction of the rate.
         reluctance ["-", FINITE] = rng.random_range(0.5..0.95);
-        /// Time constant of its recovery.
+        /// Time constant of the recovery.
         time ["s", TIME] = log_uniform(rng, 0.03, 0.12);
     }
     part(law, _) {

@@ -11,7 +11,7 @@ pub(super) trait StrengthLaw: Copy + Debug + Send + Sync + 'static {
     fn strength(&self, pulses: &Pulses, t: f64) -> f64;
 }
 
-/// The jet with this law.
+/// A part of the jet path with this law.
 pub(super) fn jet(law: impl StrengthLaw) -> Part {
     Part::Jet(Box::new(Pulsing {
         law,

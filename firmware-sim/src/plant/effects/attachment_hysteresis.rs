@@ -14,7 +14,7 @@ physics! {
     parameters(base, rng) {
         /// Friction above which the flow attaches.
         upper_threshold ["y", FINITE] = rng.random_range(0.55..0.75) * base.gain;
-        /// Friction below which it detaches.
+        /// Friction below which the flow detaches.
         lower_threshold ["y", FINITE] = lower_threshold;
         /// Contribution of the closed relay to the drive.
         // Without a jet the relay must release: gain below the lower threshold.

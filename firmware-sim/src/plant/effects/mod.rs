@@ -46,7 +46,7 @@ pub enum EffectError {
         /// The known names.
         known: String,
     },
-    /// The effect has no such parameter.
+    /// The effect has no parameter of this name.
     #[error("`{effect}` has no parameter `{parameter}`; it has: {known}")]
     UnknownParameter {
         /// Name of the effect.
@@ -161,15 +161,15 @@ pub enum ShowsWith {
 pub(crate) trait Physics: Copy + Debug + PartialEq + Sized + 'static {
     /// Name in model files and reports.
     const NAME: &'static str;
-    /// The effect of the catalogue that it is or resembles.
+    /// The effect of the catalogue that it is or that it resembles.
     const RESEMBLES: &'static str = Self::NAME;
     /// Place of the effect.
     const PLACE: Place;
     /// Parameters of the effect, in the catalogue's order.
     const PARAMETERS: &'static [Card<Self>];
-    /// Commands with which it is visible.
+    /// Commands under which the effect is visible.
     const SHOWS_WITH: ShowsWith = ShowsWith::OnOff;
-    /// The measured channel that is required to identify it.
+    /// The measured channel without which the effect is not identifiable.
     const CHANNEL: Option<&'static str> = None;
 
     /// Random parameters for the rig `base`: visible and plausible.
@@ -374,12 +374,12 @@ macro_rules! catalogue {
                 (self.place(), names.take_while(|name| **name != self.name()).count())
             }
 
-            /// Commands with which it is visible.
+            /// Commands under which the effect is visible.
             pub fn shows_with(&self) -> ShowsWith {
                 match self { $(Self::$effect(_) => $effect::SHOWS_WITH,)+ }
             }
 
-            /// The measured channel that is required to identify it.
+            /// The measured channel without which the effect is not identifiable.
             pub fn channel(&self) -> Option<&'static str> {
                 match self { $(Self::$effect(_) => $effect::CHANNEL,)+ }
             }
@@ -407,7 +407,7 @@ macro_rules! catalogue {
                 match self { $(Self::$effect(effect) => validate(effect),)+ }
             }
 
-            /// The effect of the catalogue that it is or resembles.
+            /// The effect of the catalogue that it is or that it resembles.
             pub fn resembles(&self) -> &'static str {
                 match self { $(Self::$effect(_) => $effect::RESEMBLES,)+ }
             }
@@ -478,7 +478,7 @@ pub(crate) fn exclude(a: (&str, Place), b: (&str, Place)) -> bool {
     a.0 == b.0 || [a.1, b.1] == [Place::Transport; 2]
 }
 
-/// A size of either sign.
+/// A random size with a random sign.
 pub(super) fn signed(rng: &mut ChaCha8Rng, low: f64, high: f64) -> f64 {
     let size = rng.random_range(low..high);
     if rng.random_bool(0.5) { size } else { -size }

@@ -7,7 +7,7 @@ use crate::plant::part::{Part, SensorPart};
 physics! {
     /// The film measures the magnitude of the friction.
     RectifyingSensor = "rectifying-sensor" at Sense {
-        /// It only changes negative friction.
+        /// The effect changes negative friction only.
         const SHOWS_WITH: ShowsWith = ShowsWith::SignedLevels;
     }
     parameters(_, _) {}

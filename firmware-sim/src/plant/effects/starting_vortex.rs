@@ -11,7 +11,7 @@ physics! {
     parameters(_, rng) {
         /// Strength.
         gain ["-", FINITE] = rng.random_range(0.4..1.0);
-        /// Time constant of its decay.
+        /// Time constant of the vortex's decay.
         decay_time ["s", TIME] = log_uniform(rng, 0.020, 0.080);
     }
     part(law, _) { Part::Jet(Box::new(Vortex::starting(law.gain, law.decay_time))) }

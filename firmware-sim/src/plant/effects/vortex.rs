@@ -12,7 +12,7 @@ pub(super) struct Vortex {
 }
 
 impl Vortex {
-    /// Driven by an increasing jet, adds to it.
+    /// A vortex of an increasing jet, which adds to the jet.
     pub(super) fn starting(gain: f64, decay_s: f64) -> Self {
         Self {
             gain,
@@ -22,7 +22,7 @@ impl Vortex {
         }
     }
 
-    /// Driven by a decreasing jet, opposes it.
+    /// A vortex of a decreasing jet, which is subtracted from the jet.
     pub(super) fn stopping(gain: f64, decay_s: f64) -> Self {
         Self {
             sign: -1.0,

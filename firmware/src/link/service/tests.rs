@@ -99,7 +99,7 @@ impl Bench {
         );
     }
 
-    /// Runs samples with a healthy sensor; `there` sends keep-alive messages.
+    /// Runs samples with a healthy sensor; if `there`, the host sends keep-alive messages.
     fn run(&mut self, samples: usize, there: bool) {
         for _ in 0..samples {
             if there && self.k.is_multiple_of(100) {

@@ -102,7 +102,7 @@ pub(super) struct Piece {
 pub(super) struct Constant {
     pub(super) name: String,
     pub(super) value: f64,
-    /// Its formula in the parameters.
+    /// Formula of the constant in the parameters.
     pub(super) formula: String,
 }
 
@@ -126,7 +126,7 @@ impl Piece {
             channel: made.channel,
             reference: T::from_f64(made.reference),
         };
-        // The place determines only which hook would run it.
+        // Any place will do: it determines only the hook that would run the program.
         let host = UserEffect::of(program, Place::Jet, &parameters, &setting);
         let values = (0..program.ops.len()).map(|r| host.constant(r).value());
         let taps = (0..program.lines).map(|line| {
@@ -223,7 +223,7 @@ impl Piece {
         format!("{}v{register}", self.prefix.to_lowercase())
     }
 
-    /// Prefix of the names of its parameters.
+    /// Prefix of the names of the piece's parameters.
     pub(super) fn owner(&self) -> &str {
         &self.owner
     }
@@ -249,7 +249,7 @@ impl Piece {
         self.program.reads(Op::Reference) || self.reads(Signal::Channel)
     }
 
-    /// The constants that it needs.
+    /// The constants that the piece needs.
     pub(super) fn constants(&self, tongue: &impl Tongue) -> Vec<Constant> {
         let each = self.constants.iter().filter_map(|register| {
             Some(Constant {

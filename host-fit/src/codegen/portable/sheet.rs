@@ -57,7 +57,7 @@ pub(super) struct Sheet<'a> {
 }
 
 impl<'a> Sheet<'a> {
-    /// Everything in numbers of type `T`.
+    /// The model's data in numbers of type `T`.
     pub(super) fn new<T: Real>(model: &'a Model) -> Result<Self, CodegenError> {
         let period_s = model.sample_period_s;
         let channels = model.channels();

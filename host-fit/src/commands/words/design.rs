@@ -66,7 +66,7 @@ fn track_words(design: &TrackDesign, period_s: f64) -> String {
     text
 }
 
-/// The proven bound, or why there is none.
+/// The proven bound, or the reason why there is no bound.
 fn certificate_words(certificate: &Certificate) -> String {
     match certificate {
         Certificate::Bound(bound) => format!(
@@ -80,7 +80,7 @@ fn certificate_words(certificate: &Certificate) -> String {
     }
 }
 
-/// The loop's period in words; empty for the usual one.
+/// The loop's period in words; empty for the usual period.
 fn every(period_s: f64) -> String {
     let period = milliseconds(1.0, period_s);
     if period == 1.0 {
@@ -235,7 +235,7 @@ fn judged_interval(proof: &Proof) -> String {
 /// Which trials decide.
 const DECIDING: &str = "Cases `model` and `p` (one-sided p-value on the records) decide. Cases `unseen` (excluded by the records, but too small for a diagnosis) and `stress` (outside the records) only warn";
 
-/// Columns of [`trial_rows`]: name, and whether it holds numbers.
+/// Columns of [`trial_rows`]: the name, and whether the column holds numbers.
 pub(crate) const TRIALS: [(&str, bool); 11] = [
     ("trial", false),
     ("likely", false),

@@ -34,7 +34,7 @@ pub(super) struct ModelBench {
     compared: Mutex<HashMap<u32, Arc<Compared>>>,
     /// The free run of the best model of a running search: number of evaluations, and y per record.
     best: Mutex<Option<(usize, Vec<Vec<f64>>)>>,
-    /// Whether a step runs: its data set stays.
+    /// Whether a step runs. The data set is not exchanged meanwhile.
     busy: AtomicBool,
 }
 
@@ -187,7 +187,7 @@ impl ModelBench {
             .all(|record| record.role == Use::Validate)
         {
             return Err(Refusal(
-                "a model needs an estimation record: leave one out of the validation records"
+                "all records are validation records, but a model is fitted to estimation records: unmark at least one"
                     .to_owned(),
             ));
         }
@@ -358,7 +358,7 @@ impl ModelBench {
                 .collect(),
             Err(_) => Vec::new(),
         };
-        // Beside the model that it was made from, if both are there.
+        // A model is shown beside the model that it was made from, if both exist.
         let parent = lock(&self.project)
             .node(id)
             .ok()

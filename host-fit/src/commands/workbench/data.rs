@@ -48,7 +48,7 @@ impl Data {
 /// The files that were uploaded into a project.
 pub(super) struct Uploads(PathBuf);
 
-/// Name of their folder in the project.
+/// Name of the folder of uploads in the project.
 const UPLOADS: &str = "uploads";
 
 impl Uploads {

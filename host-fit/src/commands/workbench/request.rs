@@ -97,7 +97,7 @@ impl Command {
         }
     }
 
-    /// Whether it starts from a model.
+    /// Whether the command starts from a model.
     pub(super) fn needs_a_model(self) -> bool {
         !matches!(self, Self::Identify | Self::Import)
     }
@@ -118,7 +118,7 @@ enum Given {
 #[serde(deny_unknown_fields)]
 pub(super) struct Request {
     pub(super) command: Command,
-    /// The model that it starts from.
+    /// The model that the command starts from.
     #[serde(default)]
     pub(super) model: Option<u32>,
     /// Files that were uploaded, for `import`.

@@ -22,7 +22,7 @@ use crate::commands::{design, diagnose, discover, drawings, extend, identify, im
 /// A task that can be started.
 pub(super) struct Task {
     pub(super) line: Line,
-    /// The model that it starts from; 0 for none.
+    /// Number of the model that the task starts from; 0 for none.
     from: u32,
     asked: Asked,
 }
@@ -83,7 +83,7 @@ impl Onlooker for Page<'_> {
         (glimpse.evaluations, glimpse.best) = (snapshot.evaluations, snapshot.best);
     }
     fn finds(&self, best: &dyn Fn() -> Option<Model>) {
-        /// Largest share of the search's time for showing models, as one part in this many.
+        /// The preview takes at most 1/SHARE of the time of the search.
         const SHARE: u32 = 50;
         let mut glimpse = lock(&self.glimpse);
         let started = Instant::now();
@@ -288,7 +288,7 @@ impl Task {
         Ok(())
     }
 
-    /// The model that it starts from.
+    /// The model that the task starts from.
     fn model(&self, bench: &ModelBench) -> Result<Model, Refusal> {
         Ok(bench.compared(self.from)?.model.clone())
     }

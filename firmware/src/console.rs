@@ -95,7 +95,7 @@ impl Console {
         Self { line: Vec::new() }
     }
 
-    /// Takes a byte; a line end gives a command, an empty line none.
+    /// Takes a byte. Returns a command at the end of a line, unless the line is empty.
     pub fn receive(&mut self, byte: u8) -> Option<Command> {
         if byte != b'\n' && byte != b'\r' {
             let _ = self.line.push(byte);

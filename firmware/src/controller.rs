@@ -78,7 +78,7 @@ impl Settings {
 pub struct Reading {
     /// Counts of the sensor.
     pub counts: f32,
-    /// Counts of the measured channel; ignored if the model needs none.
+    /// Counts of the measured channel; ignored if the model needs no channel.
     pub channel: f32,
     /// Sample periods since the previous reading: more than 1 if one was missed.
     pub periods: u32,
@@ -198,7 +198,7 @@ impl<L: Law> Controller<L> {
         true
     }
 
-    /// Sets the commanded valve position; without effect unless a command is played.
+    /// Sets the commanded valve position. It acts only while a command is played.
     pub fn demand(&mut self, open: bool) {
         self.demand = open;
     }

@@ -5,7 +5,7 @@ use crate::fault::Fault;
 /// Conversion from converter counts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Calibration {
-    /// Counts at 0: for the sensor those of the natural flow, y = 0.
+    /// Counts at the value 0. For the sensor this is the natural flow, y = 0.
     pub zero: f32,
     /// y, or the channel's unit, per count.
     pub per_count: f32,
@@ -51,7 +51,8 @@ pub struct Channel {
 }
 
 impl Channel {
-    /// The rig's channel, usually at `reference`; [`around`](Self::around) it if the rig file has none.
+    /// The rig file's channel, whose usual value is `reference`. Without a channel in the rig file,
+    /// [`around`](Self::around) `reference`.
     #[must_use]
     pub const fn of(reference: f32) -> Self {
         let Some([zero, per_count, lower_rail, upper_rail]) = identified::rig::CHANNEL else {

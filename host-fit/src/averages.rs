@@ -19,8 +19,8 @@ pub fn averaged_past(series: &[f64], window: u32) -> Vec<f64> {
     each.collect()
 }
 
-/// Mean of the last `window` values, eqs. (12) and (13). Before the series every value was 0, or, with `held`, the
-/// first one.
+/// Mean of the last `window` values, eqs. (12) and (13). The values before the series are 0 or, with `held`, the first
+/// value.
 #[must_use]
 pub fn moving_average(series: &[f64], window: u32, held: bool) -> Vec<f64> {
     let window = window.max(1);

@@ -129,7 +129,7 @@ mod tests {
         assert!(!help.contains("valve-lag"), "{help}");
     }
 
-    /// The example is a command line too.
+    /// The help of every command contains an example, which is a valid command line.
     #[test]
     fn every_command_shows_an_example() {
         let mut program = Cli::command();

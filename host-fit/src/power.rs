@@ -90,7 +90,7 @@ pub fn detectable(model: &Model, records: &[Record]) -> Result<Vec<Detectable>, 
 struct Asked {
     /// Standard deviations of the amplitude's estimate.
     deviations: f64,
-    /// Threshold on the energy, as a share of the validation error's.
+    /// Threshold on the energy, as a share of the energy of the validation error.
     share: f64,
     /// Quantile of the normal distribution for the required power.
     often: f64,

@@ -465,7 +465,7 @@ mod tests {
         );
         assert_eq!(fs::read(target.join("notes.txt")).unwrap(), b"mine");
         assert_eq!(entries(folder.path()), ["set"]);
-        // If it contains a folder, files are moved one by one, the last one last.
+        // If the target contains a folder, files are moved one by one, in the order in which they were written.
         fs::create_dir(target.join("more")).unwrap();
         write("end");
         assert_eq!(fs::read(target.join("a.csv")).unwrap(), b"end");

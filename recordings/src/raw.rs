@@ -10,7 +10,7 @@ use crate::rows::{RowReader, number, open_text};
 use crate::sampling::tidy;
 use crate::thresholds::RULES;
 
-/// Longest gap in samples that is resolved; a longer one counts as this.
+/// Longest gap in samples that is resolved; a longer gap counts as one of this length.
 const FARTHEST: f64 = 1e15;
 
 /// Destination of a cell.

@@ -45,7 +45,7 @@ pub(crate) struct Rounded {
     pub(crate) longest: f64,
     /// Number of steps that differ from the most common one by more than the tolerance.
     pub(crate) uncommon: usize,
-    /// The row after the first of them.
+    /// The row after the first such step.
     pub(crate) row: usize,
 }
 

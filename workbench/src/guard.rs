@@ -59,7 +59,8 @@ impl Guard {
         }
         let given = match headers.get("x-token") {
             Some(token) => Some(token.as_bytes()),
-            // Only requests that change nothing may carry it in the address: links to files, the page itself.
+            // Only requests that change nothing may carry the token in the address: links to files, and the page
+            // itself.
             None if request.method() == Method::GET => {
                 let pairs = request.uri().query().unwrap_or("").split('&');
                 let mut found = pairs.filter_map(|pair| pair.strip_prefix("token="));

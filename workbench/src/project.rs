@@ -63,7 +63,7 @@ pub enum ProjectError {
     /// A link, which may lead out of the folder.
     #[error("{path} is a link, which is not allowed in a project: put the file itself in its place", path = .0.display())]
     Link(PathBuf),
-    /// Another workbench is open on it.
+    /// Another workbench has the project open.
     #[error("{path} is open in another workbench; use that one, or close it", path = .0.display())]
     Locked(PathBuf),
     /// `tree.json` is not a valid tree.

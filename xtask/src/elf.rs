@@ -10,9 +10,9 @@ pub(crate) struct Section {
     index: SectionIndex,
     /// Bytes.
     pub(crate) size: u64,
-    /// Whether its bytes are stored in the file, hence in flash.
+    /// Whether the section's bytes are stored in the file, hence in flash.
     pub(crate) stored: bool,
-    /// Whether it is in RAM.
+    /// Whether the section is in RAM.
     pub(crate) writable: bool,
 }
 
@@ -32,7 +32,7 @@ pub(crate) struct Symbol {
 pub(crate) struct Elf {
     /// Sections in memory.
     pub(crate) sections: Vec<Section>,
-    /// Symbols in them, each address once.
+    /// Symbols in these sections, each address once.
     pub(crate) symbols: Vec<Symbol>,
 }
 

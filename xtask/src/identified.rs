@@ -58,9 +58,8 @@ pub(crate) fn identified(arguments: &[String]) -> Result<()> {
     Ok(())
 }
 
-/// A folder with the constants of a user's model and rig, for a build of the
-/// firmware; a model that no board can run, and a rig that contradicts it, are
-/// refused. Without a model the bundled one counts.
+/// A folder with the constants of a user's model and rig, for a build of the firmware; a model that no board can run,
+/// and a rig that contradicts it, are refused. Without `model` the bundled model is used.
 pub(crate) fn of(model: Option<&Path>, rig: Option<&Path>) -> Result<PathBuf> {
     let bundled = root().join("firmware/identified/models/full.toml");
     // Relative paths refer to the folder where the task was called.

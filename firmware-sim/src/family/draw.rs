@@ -97,8 +97,8 @@ impl RigPlan {
         Ok(kinds)
     }
 
-    /// Draws the named effects and adds them to the plant. Returns the smallest weight: at least 1 if all of
-    /// them are detectable; infinite without any.
+    /// Draws the named effects and adds them to the plant. Returns the smallest weight: at least 1 if all of them are
+    /// detectable; infinite if `names` is empty.
     pub(super) fn hide(&mut self, names: &[&str]) -> Result<f64, RigError> {
         let mut rng = stream(self.seed, Stream::Effects);
         let faulty = |name: &&str| Fault::NAMES.contains(name);

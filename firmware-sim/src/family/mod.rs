@@ -226,8 +226,8 @@ impl RigPlan {
         delay.into_iter().chain(self.nuisances.effect()).collect()
     }
 
-    /// Hidden effects of the catalogue with their true parameters, in the rig's own units; effects with altered
-    /// equations have none.
+    /// Hidden effects of the catalogue with their true parameters, in the rig's own units. Effects with altered
+    /// equations have no such parameters.
     pub fn exact(&self) -> Vec<(&'static str, Vec<Parameter>)> {
         let effects = self.plant.effects.iter();
         effects.map(|e| (e.name(), e.parameters())).collect()

@@ -12,8 +12,8 @@ const TOTAL: f64 = 4.0;
 /// 1.2²) = 1.56 × the noise level.
 const OWN: f64 = 1.2;
 
-/// Required change after adding a memory of any length as well: the best base without the effect then has √(1
-/// + 0.6²) = 1.17 × the noise level.
+/// Required weight if the base may also have a memory of any length: the best base without the effect then has √(1 +
+/// 0.6²) = 1.17 × the noise level.
 const BEYOND_MEMORY: f64 = 0.6;
 
 /// Allowed range of readings (y), with a margin for noise inside the converter's −1 … 3: rigs outside are

@@ -105,7 +105,7 @@ impl Flow for GomanKhrabrov {
 mod tests {
     use super::*;
 
-    /// Kirchhoff: 2π a radian attached, a quarter of it separated.
+    /// Kirchhoff's slope: 2π per radian for attached flow, a quarter of 2π for separated flow.
     #[test]
     fn the_normal_force_is_kirchhoffs() {
         let slope = |x: f64| normal_force(1e-4, x) / 1e-4;

@@ -164,7 +164,7 @@ pub(crate) trait SensorPart: Debug + Send + Sync + BoxedSensor {
 
 macro_rules! boxed {
     ($($boxed:ident: $part:ident),+) => { $(
-        /// Copies a part behind its box.
+        /// Copies a boxed part.
         pub(crate) trait $boxed {
             /// A copy with the same state.
             fn boxed(&self) -> Box<dyn $part>;

@@ -6,7 +6,7 @@ pub const ZERO: f32 = 800.0;
 pub const PER_COUNT: f32 = 0.0005;
 /// Readings at or beyond these are at a rail, counts.
 pub const RAILS: [f32; 2] = [8.0, 4087.0];
-/// How long equal readings in a row come before the sensor is stuck, s.
+/// Duration of equal readings after which the sensor counts as stuck, s.
 pub const STUCK_AFTER_S: f32 = 0.5;
 /// Largest residual, averaged over about 64 samples, y.
 pub const RESIDUAL_ENVELOPE: f32 = 0.5;

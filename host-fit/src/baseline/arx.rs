@@ -195,8 +195,8 @@ pub(super) fn of_delay(series: &[Series], scaling: &Scaling, delay: usize) -> Op
     Some(least_squares(series, delay)?.unscaled(scaling))
 }
 
-/// The stable ARX(2,2) with the least free-run error on the scaled records over all delays; `near` are dead
-/// times, in samples, around which every delay is tried. `None` if no delay gives a stable one.
+/// The stable ARX(2,2) with the least free-run error on the scaled records over all delays; `near` are dead times, in
+/// samples, around which every delay is tried. `None` if no delay gives a stable model.
 pub(super) fn fit(
     series: &[Series],
     scaling: &Scaling,

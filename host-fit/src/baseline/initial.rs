@@ -21,7 +21,7 @@ pub(super) struct InitialState {
     beginning: Range<usize>,
 }
 
-/// Σ of products over the shorter of two.
+/// Inner product of two series over the length of the shorter one.
 pub(super) fn inner(a: &[f64], b: &[f64]) -> f64 {
     let both = a.len().min(b.len());
     dot(

@@ -164,7 +164,8 @@ struct ShortestTime<'a> {
 }
 
 impl ShortestTime<'_> {
-    /// The time in seconds. Refused if shorter than the measured or, without a measurement, the recorded one.
+    /// The time in seconds. An error if it is shorter than the measured shortest time or, without a measurement, the
+    /// shortest time in the records.
     fn seconds(&self, period_s: f64) -> anyhow::Result<f64> {
         let Self { option, .. } = self;
         let known = self.measured.or(self.recorded);

@@ -14,7 +14,7 @@ pub(crate) fn rust(rig: &RigFile) -> String {
          pub const PER_COUNT: f32 = {:?};\n\
          /// Readings at or beyond these are at a rail, counts.\n\
          pub const RAILS: [f32; 2] = [{:?}, {:?}];\n\
-         /// How long equal readings in a row come before the sensor is stuck, s.\n\
+         /// Duration of equal readings after which the sensor counts as stuck, s.\n\
          pub const STUCK_AFTER_S: f32 = {:?};\n\
          /// Largest residual, averaged over about 64 samples, y.\n\
          pub const RESIDUAL_ENVELOPE: f32 = {:?};\n\

@@ -16,7 +16,7 @@ pub(super) struct Tried {
     pub(super) proof: Proof,
     /// The robustness margin; none for pulses, and for a law that loses attachment on its own model.
     pub(super) margin: Option<Margin>,
-    /// Other targets that pass, if this one does not.
+    /// Targets that pass, if the requested target does not.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub(super) targets: Vec<TargetVerdict>,
     /// Trials that were not possible, one sentence each.

@@ -99,8 +99,8 @@ pub(crate) fn widened_variance(at: &Evaluation) -> f64 {
     at.rss / free * (1.0 + rho) / (1.0 - rho) + f64::MIN_POSITIVE
 }
 
-/// The natural logarithm of the determinant of a small positive definite matrix, row by row; at least that of the least
-/// positive number.
+/// The natural logarithm of the determinant of a small positive definite matrix, row by row. A pivot is at least the
+/// smallest positive number.
 fn log_determinant(matrix: &[f64], size: usize) -> f64 {
     let mut left = matrix.to_vec();
     let mut sum = 0.0;
@@ -132,8 +132,8 @@ fn least_ratio(usual: f64, plant: &Plant) -> f64 {
     usual.min(0.2 / plant.mean_sum().max(1.0))
 }
 
-/// Third lags that are tried, as shares of the sum of the first two time constants; the smallest of three is at most half
-/// of it.
+/// Third lags that are tried, as shares of the sum of the first two time constants. The smallest of three time
+/// constants is at most half the sum of the others.
 const THIRDS: [f64; 5] = [0.06, 0.12, 0.2, 0.3, 0.45];
 
 /// The best fit with each third lag behind the plant `second`.

@@ -124,7 +124,8 @@ pub(crate) fn expect(
     })
 }
 
-/// The front of the response to one edge, as a sample of the record: the highest level change near the expected one.
+/// The front of the response to one edge, as a sample of the record: the highest level change near the expected
+/// arrival.
 pub(crate) fn own_front(levels: &[f64], edge: Edge, expected: &Expectation) -> usize {
     let centre = edge.sample + expected.of(edge).front;
     let spread = expected.reach * 2 / 3;

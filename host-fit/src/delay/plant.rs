@@ -17,7 +17,7 @@ const FIRST_ORDER: f64 = 1e-5;
 pub(crate) struct Switching {
     /// In order of time.
     pub(crate) changes: Vec<Change>,
-    /// Whether the command is on (in the upper half of its range) before the first of them.
+    /// Whether the command is on (in the upper half of its range) before the first change.
     pub(crate) on: bool,
 }
 

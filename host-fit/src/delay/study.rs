@@ -50,7 +50,7 @@ impl Default for DelayOptions {
 pub enum DelayMethod {
     /// One plant is fitted to whole records; the delay of an edge is found by shifting the edge in this fit.
     Trajectory,
-    /// Each edge by itself: the kink where y changes course.
+    /// Each edge is located by itself, where the slope of y changes.
     Kink,
     /// Each edge in its own window with the common time constants: for records with few samples between
     /// edges.

@@ -1,4 +1,4 @@
-//! White noise of a record, and single samples that are no part of it.
+//! White noise of a record, and single outliers.
 
 use crate::data::rounding_variance;
 

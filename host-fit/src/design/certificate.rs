@@ -288,8 +288,8 @@ impl Positive {
         let closing = (self.off.constant + self.off.older() * high) / (1.0 - self.off.newest());
         // Open, may close and stays open: the prediction with the closed valve is at most the target.
         let stays = newest_at(&self.off, &self.off, closed, target, low);
-        // Opens: the prediction with the open valve is below the target. Its first sample may still be of the
-        // closed one.
+        // Opens: the prediction with the open valve is below the target. The first sample of this prediction may still
+        // have the closed valve.
         let first = if self.mixes { &self.off } else { &self.on };
         let opens = newest_at(first, &self.on, open, target, low);
         let [shortest, _] = self.hold;

@@ -146,7 +146,7 @@ impl HorizonSearch<'_> {
         }
     }
 
-    /// Evaluates both completions of a command and stores the better one.
+    /// Completes a command with an open and with a closed valve, and stores the better of the two.
     fn promise(&self, mut node: Node, blocks: usize) -> Node {
         node.promise = f64::NEG_INFINITY;
         for end in [true, false] {

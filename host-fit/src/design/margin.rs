@@ -33,11 +33,11 @@ pub struct Margin {
 pub struct ErrorInterval {
     /// The quantity in error.
     pub error: &'static str,
-    /// Lowest, as a share; above −1.
+    /// Lowest tolerated error, as a share; above −1.
     pub low: f64,
-    /// Highest, as a share.
+    /// Highest tolerated error, as a share.
     pub high: f64,
-    /// Whether each end is the limit of the search rather than of the law.
+    /// For each end, whether it is the limit of the search; if not, it is the limit of the law.
     pub open: [bool; 2],
 }
 

@@ -141,7 +141,7 @@ impl RecordJudge {
         &self.records
     }
 
-    /// Indices of the best fit's free coordinates among those of `model`; none for those it lacks.
+    /// Indices of the best fit's free coordinates among those of `model`; `None` for a coordinate that `model` lacks.
     pub(super) fn places(&self, model: &Model) -> Vec<Option<usize>> {
         let coordinates = model.coordinates();
         let place = |name: &String| coordinates.iter().position(|own| own.name == *name);
@@ -306,8 +306,8 @@ mod tests {
         (0..4).map(record).collect()
     }
 
-    /// The true size of a pickup is excluded no more often than the p-value states; ten times that size
-    /// always is.
+    /// The true size of a pickup is excluded no more often than the p-value states. A pickup ten times as large is
+    /// always excluded.
     #[test]
     fn the_true_size_is_rarely_excluded_and_ten_times_that_is() {
         let seeds = 40;

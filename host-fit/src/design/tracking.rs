@@ -461,7 +461,7 @@ pub(super) mod tests {
             ..TrackRequest::holding(0.8)
         };
         let design = track(&model, &calm).unwrap();
-        // A cycle of 100 ms, 28.7 % of it closed, held for most of that.
+        // The cycle lasts 100 ms. The valve is closed for 28.7 % of it, of which the hold time is the larger part.
         assert_eq!(design.law.hold.on, 10);
         assert!((20..=25).contains(&design.law.hold.off), "{design:?}");
         assert_eq!(design.law.switches, Some([50, 10]));

@@ -25,8 +25,8 @@ pub struct Certificate {
     pub alpha: f64,
     /// Names of the records from which it was computed.
     pub records: Vec<String>,
-    /// Share of the variance left unexplained by the best model without the effect that the model with it explains.
-    /// At most 1; negative if the model with the effect leaves more.
+    /// Of the variance that the best model without the effect leaves unexplained: the share that the model with the
+    /// effect explains. At most 1; negative if the model with the effect leaves more variance unexplained.
     #[serde(skip)]
     pub share: f64,
 }
@@ -78,8 +78,8 @@ impl Session<'_> {
         })
     }
 
-    /// By how many parameters `model` is leaner than the given model, and by how many nats it has more evidence. `None`
-    /// unless both are positive.
+    /// Number of parameters that `model` has fewer than the given model, and nats of evidence that it has more. `None`
+    /// if one of the two numbers is not positive.
     fn leaner_than_given(&self, model: &Hypothesis) -> Option<(usize, f64)> {
         let count = |model: &Model| model.coordinates().len();
         let fewer = count(self.given).checked_sub(count(model.judged.model()))?;

@@ -131,7 +131,7 @@ pub struct Ranked {
     pub confounded_with: Vec<String>,
     /// Whether the gain is significant and above the practical margin.
     pub significant: bool,
-    /// Whether the whole model was refitted with it; if not, its numbers are first-order predictions of the
+    /// Whether the whole model was refitted with the candidate; if not, the numbers are first-order predictions of the
     /// screening.
     pub refitted: bool,
     /// ln of the evidence of the refitted model, nats. Comparable within one diagnosis.
@@ -199,8 +199,8 @@ pub struct Diagnosis {
     pub not_tried: Vec<NotTried>,
     /// The experiment that would distinguish the members of an equivalence set.
     pub separation: Option<Separation>,
-    /// Upper bound (by the e-value) of the family-wise p-value of the named effects or surrogates; none if there are
-    /// none.
+    /// Upper bound (by the e-value) of the family-wise p-value of the named effects or surrogates; `None` if no effect
+    /// is named.
     pub p_value: Option<f64>,
     /// The final model.
     pub model: Model,

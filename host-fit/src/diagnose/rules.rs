@@ -14,8 +14,9 @@ rules! {
     level: f64 = 0.05, "p-value", "convention";
     /// Family-wise level: the e-value must be at least the inverse of this.
     level_of_search: f64 = 0.02, "p-value", "target: at most 3 % false names";
-    /// At a known noise level an effect is left out, or replaced by lags, if the validation error rises by no more than this
-    /// fraction. At an unknown one, effects are not missing in a given model whose error is larger by no more than this.
+    /// At a known noise level an effect is left out, or replaced by lags, if the validation error rises by at most this
+    /// fraction. At an unknown noise level, no effect is missing if the error of the given model is larger by at most
+    /// this fraction.
     worthwhile: f64 = 0.015, "share of the rms error", "cases without an effect in six families: noise alone \
          reaches 0.01";
     /// Validation errors that differ by less than this are equal in practice.

@@ -333,7 +333,7 @@ impl Term {
         Definition::from_toml(&self.file(""), &self.name())
     }
 
-    /// The model with the term; `reference` is that of its channel. `None` if the model has an effect of the
+    /// The model with the term; `reference` is the reference of its channel. `None` if the model has an effect of the
     /// same name.
     pub(super) fn added_to(&self, model: &Model, reference: Option<f64>) -> Option<Model> {
         let mut model = model.clone();

@@ -157,7 +157,7 @@ pub fn separating(
     })
 }
 
-/// The best plan, the first among equals.
+/// The best plan; of equally good plans the first.
 fn pick(
     plans: Vec<Openings>,
     score: &(dyn Fn(&Openings) -> f64 + Sync),

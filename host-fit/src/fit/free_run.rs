@@ -354,7 +354,7 @@ impl LeastSquares for FreeRunProblem<'_> {
                         square += measured[k] * measured[k];
                     }
                 }
-                // NaN stops as well.
+                // A NaN also ends the run.
                 if sum <= enough {
                     ControlFlow::Continue(())
                 } else {

@@ -11,7 +11,7 @@ use crate::linalg::{self, Cholesky};
 
 /// Number of cached tables; the least recently used is dropped. One of 500 lags takes 2 MB.
 const TABLES_KEPT: usize = 48;
-/// Tables in memory in addition to the cached ones: the unweighted one, and two matrices needed to build one.
+/// Tables in memory in addition to the cached ones: the unweighted table, and two matrices needed to build a table.
 const TABLES_BESIDE: u64 = 3;
 
 /// Bytes of one table.
@@ -43,9 +43,9 @@ const SAMPLES_PATCHED: usize = 3000;
 pub(crate) enum Which {
     /// Weight 1.
     Plain,
-    /// d of one input.
+    /// The arriving command of one input.
     Single(i64),
-    /// Product of d of two inputs, or of one with itself.
+    /// The product of the arriving commands of two inputs, or the square of one.
     Product(i64, i64),
 }
 

@@ -66,8 +66,7 @@ pub struct Structure {
     pub product_lags: usize,
     /// N3, number of input delays; 0 for a model without input.
     pub inputs: usize,
-    /// Longest lag, samples, at least 1; lags run from 1 to it. Searched input
-    /// delays do not exceed it either.
+    /// Longest lag, samples, at least 1. Lags run from 1 to this value, and searched input delays do not exceed it.
     pub longest_lag: u16,
     /// Convention of the lags.
     pub convention: LagConvention,

@@ -73,8 +73,8 @@ impl Cholesky {
     }
 }
 
-/// Solves A·x = b for a symmetric positive definite A (row-major); `None` if it is not. The unknowns may differ in
-/// size by many orders.
+/// Solves A·x = b for a symmetric positive definite A (row-major); `None` if A is not positive definite. The unknowns
+/// may differ in size by many orders.
 pub(crate) fn solve_symmetric(a: &[f64], b: &[f64]) -> Option<Vec<f64>> {
     let factor = Cholesky::new(a, b.len());
     let complete = factor.inverse_diagonal.iter().all(|inverse| *inverse > 0.0);

@@ -14,7 +14,7 @@ const RANK_TOLERANCE: f64 = 1e-12;
 
 /// A direction with less than this share of the information of the best one counts as not identified.
 const UNKNOWN: f64 = 1e-11;
-/// A coordinate belongs to a direction if it has more than this share of it.
+/// A coordinate belongs to a direction if its share of the direction is larger.
 const TAKES_PART: f64 = 1e-6;
 
 /// A decomposition that did not converge.
@@ -140,7 +140,7 @@ fn four_dots(a: &[f64], others: [&[f64]; 4]) -> [f64; 4] {
 }
 
 /// The inverse of an information matrix (symmetric, row-major, `n` × `n`) in its identified directions, and the
-/// coordinates that belong to the others. `None` if the decomposition fails.
+/// coordinates that belong to the other directions. `None` if the decomposition fails.
 pub(crate) fn inverse_where_known(a: &[f64], n: usize) -> Option<(Vec<f64>, Vec<bool>)> {
     let size = |i: usize| a.get(i * n + i).filter(|d| **d > 0.0).map(|d| d.sqrt());
     let sizes: Vec<f64> = (0..n).map(|i| size(i).unwrap_or(1.0)).collect();
@@ -216,7 +216,7 @@ pub(crate) fn signed_products(a: &[f64], signs: &[f64]) -> Vec<f64> {
     out
 }
 
-/// AᵀB for A and B of `rows` rows, column by column; the result too. Incomplete columns are ignored.
+/// AᵀB for A and B of `rows` rows. A, B and the result are stored column by column. Incomplete columns are ignored.
 pub(crate) fn cross_products(a: &[f64], b: &[f64], rows: usize) -> Vec<f64> {
     if rows == 0 {
         return Vec::new();

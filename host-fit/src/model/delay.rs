@@ -65,7 +65,7 @@ impl TransportLaw {
         law.bounds().unwrap_or_else(|| [law.delay(0.0); 2])
     }
 
-    /// Whether it delays edges of the command separately, so that jets are no longer on/off.
+    /// Whether the law delays edges of the command separately, so that jets are no longer on/off.
     #[must_use]
     pub fn shapes_command(&self) -> bool {
         self.spec.law.is_some_and(|law| law.shapes_command)
@@ -175,8 +175,8 @@ impl Delay {
         }
     }
 
-    /// The longest delay, samples, at a sample period of `period_s` s. A separately delayed edge ends within
-    /// a sample, not on it.
+    /// The longest delay, samples, at a sample period of `period_s` s. An edge that is delayed separately arrives
+    /// between two samples.
     #[must_use]
     pub(super) fn longest(&self, period_s: f64) -> f64 {
         match self {

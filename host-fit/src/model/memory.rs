@@ -27,7 +27,7 @@ pub struct Footprint {
 pub struct Channel {
     /// Name of the channel in records and model files.
     pub name: String,
-    /// Its reference value, in its unit; 1 if the model file has none.
+    /// Reference value of the channel, in its unit; 1 if the model file contains no reference.
     pub reference: f64,
 }
 

@@ -45,7 +45,7 @@ pub struct Model {
     pub averaging: Averaging,
     /// Initial state of a free run.
     pub start: Start,
-    /// The commands of no jet and of a full one.
+    /// The commands of no jet and of a full jet.
     pub command: CommandRange,
     /// The response to jets of part strength.
     pub grading: Grading,
@@ -245,8 +245,8 @@ impl Model {
         own.find(|definition| definition.spec().name == name)
     }
 
-    /// Makes a user effect available to the model. An existing one of the same name is replaced, unless the
-    /// model uses it.
+    /// Makes a user effect available to the model. It replaces an effect with the same name, unless the model uses that
+    /// effect.
     ///
     /// # Errors
     /// [`DefineError`] if the model uses another effect of that name.
@@ -394,8 +394,8 @@ impl Model {
         names
     }
 
-    /// Adds an effect with the values `parameters` at its physical position: of the catalogue, or a
-    /// [defined](Self::define) user effect. A delay law replaces the present one.
+    /// Adds an effect of the catalogue or a [defined](Self::define) user effect, with the values `parameters`, at its
+    /// physical position. A delay law replaces the present one.
     pub fn add(&mut self, spec: &'static Spec, parameters: &[f64], reference: Option<f64>) {
         if spec.place == Place::Delay {
             self.delay = Delay::Law(TransportLaw {

@@ -94,7 +94,7 @@ impl Ink {
     }
 }
 
-/// A picture: one SVG document for wide places and one for narrow ones. As a text it is the wide one.
+/// A picture: one SVG document for wide places and one for narrow ones. As text it is the wide document.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Picture {
     wide: String,

@@ -30,7 +30,7 @@ pub struct CurvePlot<'a> {
     pub y_label: &'a str,
     /// The curve on ascending coordinates.
     pub points: &'a [BandPoint],
-    /// A formula for it on ascending coordinates: x and value; empty for none.
+    /// A formula for the curve on ascending coordinates: x and value; empty for none.
     pub formula: &'a [(f64, f64)],
     /// Label of the formula in the legend.
     pub formula_label: &'a str,

@@ -200,7 +200,7 @@ fn edges(canvas: &mut Canvas, panel: &Panel, bins: &[FailureBin], slot: f64) {
     }
 }
 
-/// Limits written with as few digits, at least three, as distinguish neighbours.
+/// Limits with the fewest digits, at least three, that distinguish neighbours.
 fn distinct(limits: &[(f64, f64)]) -> Vec<(f64, String)> {
     let written = |digits| -> Vec<(f64, String)> {
         let label = |(at, limit): &(f64, f64)| (*at, super::significant(*limit, digits));

@@ -30,7 +30,7 @@ pub struct Preparation {
     /// The records, with the signals before their first sample and the range of scored samples. If the sensor's
     /// offset varies, each record's own offset is subtracted.
     pub records: Vec<Record>,
-    /// The command of no jet and of a full one, in the unit of u.
+    /// The commands of no jet and of a full jet, in the unit of u.
     pub command: CommandRange,
     /// Whether a full jet of that range is one of the rig, not only the largest command of the records.
     pub full_is_known: bool,
@@ -149,7 +149,7 @@ impl Preparation {
         }
         if self.command.off != 0.0 {
             remarks.push(format!(
-                "No jet is a command of {}, a full jet one of {}.",
+                "The command is {} without a jet and {} with a full jet.",
                 self.command.off, self.command.full
             ));
         }

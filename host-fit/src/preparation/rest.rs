@@ -53,7 +53,7 @@ impl Noise {
 }
 
 impl<'a> Rests<'a> {
-    /// The rests of `records` under a command of `off`; `None` if none does.
+    /// The rests of `records` under a command of `off`; `None` if no record rests.
     fn of(records: &'a [Record], beginnings: &[Beginning], off: f64) -> Option<Self> {
         let pairs = records.iter().zip(beginnings);
         let rests: Vec<(&Record, &[f64])> = pairs

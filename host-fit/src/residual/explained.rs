@@ -26,7 +26,7 @@ pub enum Dependence {
     Mean,
     /// The ratio of error to y depends on the coordinate.
     Proportion,
-    /// The mean error depends on it and on the dwell before the edge.
+    /// The mean error depends on the coordinate and on the dwell before the edge.
     Dwell,
     /// The size of the error depends on the coordinate, but not the sign.
     Size,

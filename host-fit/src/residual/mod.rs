@@ -70,7 +70,7 @@ pub struct Interval {
     pub to: f64,
     /// Share of the unexplained variance in the bin, 0–1.
     pub share: f64,
-    /// Share of the samples in it, 0–1; for a frequency band, share of the energy of y.
+    /// Share of the samples in the bin, 0–1; for a frequency band, share of the energy of y.
     pub of_samples: f64,
 }
 

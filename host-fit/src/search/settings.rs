@@ -22,7 +22,7 @@ pub struct Settings {
 pub enum PollKind {
     /// All vectors of an orthogonal basis with both signs: 2n points.
     Ortho2N,
-    /// The more promising half of them and minus their sum: n + 1 points.
+    /// The more promising n of these vectors, and the negative of their sum: n + 1 points.
     OrthoNPlus1,
 }
 

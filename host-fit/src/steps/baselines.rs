@@ -8,7 +8,7 @@ use serde::Serialize;
 /// Baselines with the scored samples.
 #[derive(Clone, Debug, Serialize)]
 pub struct Beside {
-    /// FIT of each, %: on the validation records, or on the estimation records if there are none.
+    /// FIT of each baseline, %: on the validation records, or on the estimation records if there are none.
     #[serde(rename = "baselines")]
     pub fits: BaselineFits,
     /// Number of scored samples in all records.

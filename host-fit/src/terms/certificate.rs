@@ -19,7 +19,7 @@ pub(crate) fn log_e(evidence: f64, without: f64, tried: usize) -> f64 {
     evidence - without - (tried.max(1) as f64).ln()
 }
 
-/// The p-value that an e-value bounds: by Markov's inequality at most its inverse.
+/// Upper bound of the p-value: the inverse of the e-value, by Markov's inequality.
 pub(crate) fn p_of(log_e: f64) -> f64 {
     (-log_e).exp().clamp(f64::MIN_POSITIVE, 1.0)
 }
@@ -83,7 +83,7 @@ impl MostLikely {
         Some(evidence(judge, &self.model, &self.records)? - noise)
     }
 
-    /// A Gauss–Newton step, halved until the likelihood increases; `None` if it never does.
+    /// A Gauss–Newton step, halved until the likelihood increases; `None` if no step length increases it.
     fn stepped(&self, judge: &Judge) -> Option<Model> {
         let free = judge.free(&self.model);
         let normal = normal_equations(&self.model, &free, &self.records)?;

@@ -26,9 +26,9 @@ pub struct Hypothesis {
     pub terms: Vec<Term>,
     /// Fits and validation error of the model.
     pub judged: Judged,
-    /// Whether further terms were already screened on it.
+    /// Whether further terms were already screened on the hypothesis.
     pub(super) expanded: bool,
-    /// Whether it descends from the given structure instead of from the lowest-order model.
+    /// Whether the hypothesis descends from the given structure instead of from the lowest-order model.
     pub(super) from_given: bool,
     /// Whether an effect is at a bound of its range. Further terms are screened on such a hypothesis, but it cannot
     /// be a result.
@@ -59,13 +59,13 @@ impl Hypothesis {
         }
     }
 
-    /// Whether it has no effect among its terms.
+    /// Whether the hypothesis has no effect among its terms.
     #[must_use]
     pub fn is_bare(&self) -> bool {
         self.terms.iter().all(|term| term.effect().is_none())
     }
 
-    /// Number of parameters of its terms, as the penalty counts them.
+    /// Number of parameters of the terms, as the penalty counts them.
     #[must_use]
     pub fn cost(&self) -> usize {
         self.terms.iter().map(Term::cost).sum()
@@ -717,7 +717,7 @@ fn keep(all: &mut Vec<Hypothesis>, mut hypothesis: Hypothesis) {
         _ => hypothesis.score() < other.score(),
     };
     if better {
-        // Candidates were screened on it already, unless its terms have changed.
+        // Candidates were already screened on this hypothesis, unless its terms have changed.
         hypothesis.expanded = other.expanded && hypothesis.score() > other.score() - RULES.price;
         *other = hypothesis;
     }

@@ -167,8 +167,8 @@ impl Definition {
         &self.spec
     }
 
-    /// Whether its parameters scale with the units of y and time, as those of the catalogue do; its ranges and starting
-    /// values are then for y of order 1 and 1 ms a sample.
+    /// Whether the effect's parameters scale with the units of y and time, like those of the catalogue. Its ranges and
+    /// starting values are then for y of order 1 and samples of 1 ms.
     #[must_use]
     pub fn scales(&self) -> bool {
         self.source.scales

@@ -19,7 +19,7 @@ pub enum Place {
 /// How the output depends on a parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Influence {
-    /// The output is differentiable with respect to it.
+    /// The output is differentiable with respect to the parameter.
     Smooth,
     /// The output changes in steps (a threshold, a rounded delay).
     Stepwise,
@@ -210,7 +210,7 @@ pub enum Needs {
     Nothing,
     /// An input with more than two levels.
     GradedInput,
-    /// A dead time that is longer than that of the sensor.
+    /// A dead time longer than the dead time of the sensor.
     DeadTime,
 }
 
@@ -244,9 +244,9 @@ pub struct Amplitude {
     /// The effect in a phrase, for example "a lag of the valve" in "a lag of the valve above 3 ms would have been
     /// detected".
     pub words: &'static str,
-    /// Whether the effect's contribution is proportional to it for constant other parameters.
+    /// Whether the effect's contribution is proportional to this parameter while the other parameters are constant.
     pub linear: bool,
-    /// Whether all other parameters vanish with it.
+    /// Whether all other parameters are zero when this parameter is zero.
     pub together: bool,
     /// A more intuitive number than the parameter; `None` for the parameter [as spoken](Unit::spoken).
     pub said: Option<Said>,
@@ -309,8 +309,8 @@ pub enum RustType {
 pub struct LawCard {
     /// The law in words, with `{}` for each parameter: "{} + {}·exp(−{}·ỹ) samples".
     pub words: &'static str,
-    /// Whether it delays edges of the command separately, so that jets are no longer on/off. Its delays are
-    /// then not rounded.
+    /// Whether the law delays edges of the command separately, so that jets are no longer on/off. Its delays are then
+    /// not rounded.
     pub shapes_command: bool,
     /// The public fields of its type, if they are the parameters in order: generated code can then have it as
     /// a constant.

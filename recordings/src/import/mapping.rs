@@ -443,7 +443,7 @@ fn two_levels(u: &[f64]) -> Option<(f64, f64)> {
     (u.iter().filter(near).count() as f64 >= 0.98 * u.len() as f64).then_some((low, high))
 }
 
-/// The value rounded to this many digits after its first.
+/// The value rounded to its first digit and `digits` further ones.
 fn brief(value: f64, digits: usize) -> f64 {
     format!("{value:.digits$e}").parse().unwrap_or(value)
 }

@@ -45,7 +45,7 @@ pub(super) struct Stamped {
     pub(super) first: String,
     /// Seconds since the first stamp.
     pub(super) seconds: Vec<f64>,
-    /// Seconds of the day as printed; those of days are 0.
+    /// Seconds of the day as printed; 0 for a date without a time.
     pub(super) of_day: Vec<f64>,
     /// One unit in the last printed place of each, s.
     pub(super) unit: Vec<f64>,

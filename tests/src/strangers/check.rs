@@ -128,7 +128,7 @@ fn exits(right: &Right, heard: &Heard) -> Vec<String> {
                 .exit
                 .map_or("none".to_owned(), |code| code.to_string());
             wrong.push(format!(
-                "{}: exit code {exit}, {code} is right: {}",
+                "{}: exit code {exit}, correct: {code}: {}",
                 answer.command,
                 answer.complaint()
             ));
@@ -224,7 +224,7 @@ fn of_identify(right: &Right, heard: &Heard) -> Vec<String> {
             let all = record.len() - record.lead;
             if (scored as f64) < least * all as f64 {
                 wrong.push(format!(
-                    "{scored} of {all} samples of `{}` are scored, at least {:.0} % is right",
+                    "{scored} of {all} samples of `{}` are scored; required: at least {:.0} %",
                     record.name,
                     100.0 * least
                 ));
@@ -237,7 +237,7 @@ fn of_identify(right: &Right, heard: &Heard) -> Vec<String> {
         return wrong;
     };
     if let Some(least) = right.fit_at_least.filter(|least| fit < *least) {
-        wrong.push(format!("FIT {fit:.2} %, at least {least} % is right"));
+        wrong.push(format!("FIT {fit:.2} %; required: at least {least} %"));
     }
     if let Some((name, best)) = heard
         .fits
@@ -262,7 +262,7 @@ fn of_structure(right: &Right, document: &Value) -> Vec<String> {
     ] {
         let count = numbers(&delays[key]).len();
         if let Some(most) = most.filter(|most| count > *most) {
-            wrong.push(format!("{name} = {count}, at most {most} is right"));
+            wrong.push(format!("{name} = {count}; required: at most {most}"));
         }
     }
     if let Some([low, high]) = right.delay_samples {
@@ -277,7 +277,7 @@ fn of_structure(right: &Right, document: &Value) -> Vec<String> {
         if law.len() > 1 || input.is_empty() || !input.iter().all(is_right) {
             let said = structure(document);
             wrong.push(format!(
-                "{said}; a constant delay of {low} to {high} samples is right"
+                "{said}; correct: a constant delay of {low} to {high} samples"
             ));
         }
     }
@@ -320,7 +320,7 @@ fn of_dead_time(right: &Right, heard: &Heard) -> Option<String> {
         return Some("delay: no dead time".to_owned());
     };
     let outside = !(low - HALF_A_SAMPLE..=high + HALF_A_SAMPLE).contains(&truth);
-    outside.then(|| format!("delay: dead time {low:.1} to {high:.1} samples, {truth} is right"))
+    outside.then(|| format!("delay: dead time {low:.1} to {high:.1} samples; correct: {truth}"))
 }
 
 fn of_diagnose(right: &Right, heard: &Heard) -> Vec<String> {
@@ -332,7 +332,7 @@ fn of_diagnose(right: &Right, heard: &Heard) -> Vec<String> {
     let allowed = &right.verdicts;
     if !allowed.is_empty() && !allowed.iter().any(|v| v == verdict) {
         wrong.push(format!(
-            "verdict {verdict}, {} is right",
+            "verdict {verdict}; correct: {}",
             allowed.join(" or ")
         ));
     }

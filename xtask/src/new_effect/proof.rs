@@ -106,7 +106,7 @@ fn rename_version(manifest: &Path) -> Result<()> {
     };
     let (before, after) = text.split_at(end);
     let own = &before[version.unwrap_or(end)..];
-    // Its packages refer to each other by it.
+    // The packages of the copy refer to each other by this version.
     let after = after.replace(
         &format!("version = \"{own}\" }}"),
         &format!("version = \"{own}-scratch\" }}"),

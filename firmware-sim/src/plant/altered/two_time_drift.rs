@@ -6,7 +6,7 @@ use crate::plant::effects::{ThermalDrift, signed};
 use crate::plant::part::{Moment, Part, SensorPart};
 
 physics! {
-    /// Half the amplitude with each of two time constants.
+    /// Two exponential drifts with different time constants; each has half the amplitude.
     TwoTimeDrift = "two-time-drift" at Zero, like ThermalDrift
     parameters(_, rng) {
         /// Final offset.

@@ -464,7 +464,7 @@ impl Effect {
         }
     }
 
-    /// Whether it and `other` act on the same part of the rig and exclude each other.
+    /// Whether the effect and `other` act on the same part of the rig and exclude each other.
     pub fn excludes(&self, other: &Self) -> bool {
         exclude(
             (self.resembles(), self.place()),

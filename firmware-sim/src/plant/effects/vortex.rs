@@ -6,7 +6,7 @@ use crate::plant::part::{JetPart, Piece};
 pub(super) struct Vortex {
     gain: f64,
     decay_s: f64,
-    /// +1 if driven by an increasing jet, −1 by a decreasing one; also the sign of the contribution.
+    /// +1 for a vortex of an increasing jet, −1 for a vortex of a decreasing jet: the sign of its contribution.
     sign: f64,
     strength: f64,
 }

@@ -157,7 +157,7 @@ impl<'a> Sheet<'a> {
             model,
             header: crate::codegen::header_lines(model)
                 .iter()
-                // The header mentions a model instead of constants in every language.
+                // Files in other languages begin with their own lines in place of the first two.
                 .skip(2)
                 .map(|l| comment(l))
                 .collect(),

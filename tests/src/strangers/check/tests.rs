@@ -94,7 +94,7 @@ fn each_fault_is_named() {
     };
     one(
         &with(|h| h.models[0].1.exit = Some(1)),
-        "identify: exit code 1, 0 is right",
+        "identify: exit code 1, correct: 0",
     );
     one(
         &with(|h| h.models[0].1.document["delays"]["input"] = json!([12])),

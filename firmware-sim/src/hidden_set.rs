@@ -24,7 +24,7 @@ pub struct HiddenSetPlan {
 }
 
 impl HiddenSetPlan {
-    /// A random rig hiding the named effects and faults (none of either is the null case).
+    /// A random rig hiding the named effects and faults (without any: the null case).
     ///
     /// The base plant has a state-dependent delay, unless a hidden effect sets the delay. The free stream varies if
     /// an effect needs it, and in a quarter of the other cases without influence.

@@ -128,8 +128,7 @@ pub struct Excitation {
     pub alike: Vec<(usize, usize)>,
     /// Number of lags compared, evenly spaced up to the longest.
     pub lags_tried: usize,
-    /// Number of those that the commands separate (eigenvalues of their covariance above 1/100 of the
-    /// largest).
+    /// Number of these lags that the commands separate (eigenvalues of their covariance above 1/100 of the largest).
     pub lags_separated: usize,
     /// Condition number of that covariance, capped at 1e16.
     pub condition: f64,

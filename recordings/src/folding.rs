@@ -202,7 +202,7 @@ impl Folding {
         self.settle();
     }
 
-    /// Completes the current period when it, and the margin for a late anchor, is in the buffer.
+    /// Completes the current period when all its samples and the margin for a late anchor are in the buffer.
     fn settle(&mut self) {
         let margin = match self.align {
             Align::Edges => self.slack,

@@ -264,8 +264,8 @@ fn lengths(longest: usize) -> Vec<usize> {
         .collect()
 }
 
-/// The first of `lengths` with a response, provided that longer ones have one too: doubling steps, then
-/// bisection, because each test takes a quarter of a minute.
+/// The first of `lengths` with a response, if all longer ones have a response: doubling steps, then bisection, because
+/// each test takes a quarter of a minute.
 fn first_that(
     lengths: &[usize],
     answers: &mut impl FnMut(usize) -> Result<bool, LineError>,

@@ -59,7 +59,7 @@ pub struct Gap {
     pub first: u32,
     /// Number of lost samples.
     pub samples: u32,
-    /// Number of these that were dropped for lack of memory on the board; the others were lost on the line.
+    /// Number of lost samples that the board dropped for lack of memory; the others were lost on the line.
     pub left_out: u32,
 }
 

@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 pub struct Node {
     /// Number of the model, from 1.
     pub id: u32,
-    /// The model from which it was made; `None` for one that was identified or added by the user.
+    /// The model from which this model was made; `None` for a model that was identified or added by the user.
     pub parent: Option<u32>,
     /// The step in a few words: `identified`, `+ plenum-droop`.
     pub step: String,

@@ -187,7 +187,8 @@ mod tests {
         let bare = PlantSpec::new(BasePlant::draw(&mut rng), &[]);
         let levels = &command.levels[..Weight::SAMPLES];
         let weight = Weight::new(&bare, levels, None, 0.01).unwrap();
-        // A gain increased by a half is a large change, but one of the constants only.
+        // A gain larger by a half changes the readings much, but only through a constant of the flow, which does not
+        // count.
         let mut louder = bare.clone();
         louder.base.gain *= 1.5;
         assert!(weight.of(&louder).unwrap() < 0.05);

@@ -9,7 +9,8 @@ use crate::simulate::Signals;
 pub struct StepResponse {
     /// Time since the step, s, and change of y after the command opens (0 → 1) from rest.
     pub opening: Vec<(f64, f64)>,
-    /// Time since the step, s, and change of y after it closes (1 → 0) from the steady blown state; the sign is reversed.
+    /// Time since the step, s, and change of y after the command closes (1 → 0) from the steady blown state; the sign
+    /// is reversed.
     pub closing: Vec<(f64, f64)>,
 }
 

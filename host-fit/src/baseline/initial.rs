@@ -11,8 +11,8 @@ const SHARE: f64 = 0.05;
 const LONGEST: f64 = 0.25;
 
 /// Free responses of a process to its initial state. The initial state is estimated from the first twentieth of the
-/// record, at least 20 samples. If the shortest time constant is longer than half of that, up to a quarter of the
-/// record is used. In a record that begins in mid-run the first dead time is left out, because y then responds to
+/// record, at least 20 samples. If the shortest time constant is longer than half of this interval, up to a quarter of
+/// the record is used. In a record that begins in mid-run the first dead time is left out, because y then responds to
 /// commands that were not recorded.
 #[derive(Clone, Debug)]
 pub(super) struct InitialState {

@@ -32,7 +32,8 @@ pub struct Baselines {
     pub arx: Option<Arx>,
 }
 
-/// FIT of the three on the same scored samples, in percent. Serialises to `"baselines"` of `identify` and `compare`.
+/// FIT of the three baselines on the same scored samples, in percent. Serialises to `"baselines"` of `identify` and
+/// `compare`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct BaselineFits {
     /// FIT of the first order with dead time.
@@ -44,7 +45,7 @@ pub struct BaselineFits {
 }
 
 impl Baselines {
-    /// Fits all three to `learning`. All are `None` if u or y is constant, or if no record has 8 samples.
+    /// Fits all three baselines to `learning`. All are `None` if u or y is constant, or if no record has 8 samples.
     #[must_use]
     pub fn fit(learning: &[&Record]) -> Self {
         let Some(fitted) = WithDeadTime::to(learning) else {

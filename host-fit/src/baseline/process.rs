@@ -54,7 +54,7 @@ pub struct SecondOrder {
 pub struct Recursion {
     /// a_0, and a_1 of a second order.
     pub a: Vec<f64>,
-    /// Two inputs of a first order, three of a second, y per unit of u.
+    /// Coefficients of the two inputs of a first order or the three inputs of a second order, y per unit of u.
     pub b: Vec<f64>,
     /// c, in y.
     pub constant: f64,

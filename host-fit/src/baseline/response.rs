@@ -101,7 +101,7 @@ impl Response {
         }
     }
 
-    /// Its fastest time scale, samples: the decay time of an initial slope, or the time of one radian of an
+    /// Fastest time scale of the process, samples: the decay time of an initial slope, or the time of one radian of an
     /// oscillation.
     pub(super) fn fastest(&self) -> f64 {
         self.fastest

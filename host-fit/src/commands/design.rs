@@ -87,7 +87,8 @@ pub(crate) struct Args {
     /// Write a report page: the law, the closed loop, every trial.
     #[arg(long, value_name = "out.html")]
     report: Option<PathBuf>,
-    /// Write the law even if it loses attachment on a plant that is consistent with the records; the file says on which.
+    /// Write the law even if it loses attachment on a plant that is consistent with the records; the file names the
+    /// plant.
     #[arg(long)]
     force: bool,
     /// Seed of the noise, and of the effects under stress.

@@ -332,7 +332,7 @@ mod tests {
         }
         let free = plant.free(&Switching::default(), 50);
         assert_eq!(free.len(), 3);
-        // Its own state alone decays with its own time constant.
+        // From an initial value of the third lag alone, the output decays with the time constant of that lag.
         assert!((free[2][20] - (-2.0f64).exp()).abs() < 1e-3);
     }
 

@@ -286,10 +286,10 @@ impl Positive {
         let mixed = usize::from(self.mixes);
         // With a closed valve, y_{n+1} is at most the larger of y_n and `closing`.
         let closing = (self.off.constant + self.off.older() * high) / (1.0 - self.off.newest());
-        // Open, may close and stays open: the prediction with the closed valve is at most the target.
+        // The open valve may close and stays open: the prediction with the closed valve is at most the target.
         let stays = newest_at(&self.off, &self.off, closed, target, low);
-        // Opens: the prediction with the open valve is below the target. The first sample of this prediction may still
-        // have the closed valve.
+        // The valve opens: the prediction with the open valve is below the target. The first sample of this prediction
+        // may still have the closed valve.
         let first = if self.mixes { &self.off } else { &self.on };
         let opens = newest_at(first, &self.on, open, target, low);
         let [shortest, _] = self.hold;
@@ -305,8 +305,9 @@ impl Positive {
     }
 }
 
-/// The newest sample at which the prediction is `target` with the older ones at `memory`: `first` for a sample,
-/// then `map`; the mean of the samples at `looks`. The prediction is affine in the newest sample.
+/// The newest sample for which the prediction equals `target`, while all older samples are `memory`. The prediction
+/// uses `first` for one sample and then `map`, and is the mean of the samples at `looks`. It is affine in the newest
+/// sample.
 fn newest_at(first: &Map, map: &Map, looks: [usize; 2], target: f64, memory: f64) -> f64 {
     let foreseen = |newest: f64| {
         let mut path = Path::new(newest, memory);

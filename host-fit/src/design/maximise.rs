@@ -103,8 +103,8 @@ pub struct Weighed {
     pub steady_value: Option<f64>,
     /// The best pulses that do not diverge, whether or not they are the optimum.
     pub pulses: Option<BestPulses>,
-    /// The lowest price of air, y, at which one of the tried pulse trains is better than steady blowing; not
-    /// positive if it is so without a price.
+    /// The lowest price of air, y, at which one of the tried pulse trains is better than steady blowing; negative or 0
+    /// if it is better without a price.
     pub pulses_pay_from: Option<f64>,
 }
 

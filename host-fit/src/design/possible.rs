@@ -28,9 +28,9 @@ const DEVIATES: f64 = 1.96;
 pub struct PossibleFlow {
     /// The difference from the model, in words.
     pub name: String,
-    /// One-sided p-value of the records under this plant; 0.025 at the end of a 95 % interval. Below that the
-    /// plant is excluded and only warns: an effect at the size detected in 80 % of cases
-    /// ([`detectable`](crate::power::detectable)).
+    /// One-sided p-value of the records under this plant; 0.025 at the end of a 95 % interval. A plant with a smaller
+    /// p-value is excluded, and its trial only gives a warning. Its effect has the size that is detected in 80 % of
+    /// cases ([`detectable`](crate::power::detectable)).
     pub p_value: f64,
     /// The plant in the units of the given model.
     pub model: Model,

@@ -150,8 +150,8 @@ pub struct Trials<'a, F> {
     pub possible: &'a [PossibleFlow],
     /// Flows under stress.
     pub stress: &'a [Trial<F>],
-    /// Sensor noise on the model and possible plants, in units of a typical hot film's at friction of order
-    /// one.
+    /// Sensor noise on the model and possible plants, as a multiple of the noise of a typical hot film at friction of
+    /// order one.
     pub noise: f64,
     /// Seed of that noise.
     pub seed: u64,

@@ -84,8 +84,8 @@ rules! {
 
     /// A plant is possible unless the one-sided p-value of the records is below this.
     not_excluded: f64 = 0.025, "p-value", "convention: the ends of intervals of 95 %";
-    /// Steps, of a fifth each, in which the end of an interval is searched inwards from 1.96 standard errors.
-    interval_steps: u32 = 20, "", "judgement: the last step is at 1/70 of the distance";
+    /// Steps, each by a fifth, in which the end of an interval is searched inwards from 1.96 standard errors.
+    interval_steps: u32 = 20, "", "judgement: the last step is at 1/70 of 1.96 standard errors";
     /// Gauss–Newton steps of the refit for a possible plant.
     refitting_steps: usize = 5, "", "judgement";
     /// Iterations of a fit with another delay law.

@@ -166,7 +166,7 @@ impl Session<'_> {
             p_value: None,
         };
         // Effects on a base model with a larger error than the given model explain nothing. If the noise level is
-        // unknown, no effect is missing in a given model whose error is as small in practice.
+        // unknown, no effect is missing if the error of the given model is as small in practice.
         let margin = match judge.noise_source {
             NoiseSource::Scatter => RULES.worthwhile,
             NoiseSource::Measured | NoiseSource::Repeats => 0.0,

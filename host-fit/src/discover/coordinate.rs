@@ -205,8 +205,8 @@ impl Coordinate {
         }
     }
 
-    /// The state variables that it needs. The command counts as on above `on`; with `fitted`, the time constant is
-    /// a parameter.
+    /// State variables of the coordinate. The command counts as on above `on`; with `fitted`, the time constant is a
+    /// parameter.
     pub(super) fn states(&self, on: f64, time: f64, fitted: bool) -> Vec<State> {
         let rises = format!("u > {on:?} && was_on < 0.5");
         let falls = format!("u <= {on:?} && was_on > 0.5");

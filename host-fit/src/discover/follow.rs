@@ -62,7 +62,7 @@ impl Heirs {
 }
 
 impl Finder<'_> {
-    /// The fitted terms of some curves, each in its model; only one if it is at the noise level.
+    /// The fitted terms of some curves, each in its model. If a model is at the noise level, only its term is returned.
     pub(super) fn followed(
         &self,
         curves: Vec<(&Hypothesis, Screened)>,

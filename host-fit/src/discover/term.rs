@@ -57,12 +57,12 @@ struct Parameter {
 }
 
 impl Term {
-    /// Whether both have the same entry and the same coordinate up to its time constant.
+    /// Whether two terms have the same entry, and the same coordinate except for its time constant.
     pub(super) fn is_like(&self, other: &Self) -> bool {
         self.entry == other.entry && self.coordinate.slug() == other.coordinate.slug()
     }
 
-    /// Whether its coordinate has a time constant that was chosen from a grid and is not fitted.
+    /// Whether the term's coordinate has a time constant that was chosen from a grid and is not fitted.
     pub(super) fn has_chosen_time(&self) -> bool {
         self.coordinate.has_time() && self.fading.is_none()
     }

@@ -129,8 +129,7 @@ fn best_first(a: &Fit, b: &Fit) -> Ordering {
     a.mean_square().total_cmp(&b.mean_square())
 }
 
-/// The mean of the effect's channel over the records, in its unit; `None` for an effect
-/// without one.
+/// The mean of the effect's channel over the records, in its unit; `None` for an effect without a channel.
 ///
 /// # Errors
 /// [`CandidateError::MissingChannel`] for the first record that lacks it.

@@ -106,8 +106,8 @@ pub(crate) struct Descent {
     pub(crate) linearised: Option<(Vec<Part>, Vec<f64>)>,
 }
 
-/// Minimises from `values`, where the cost is `cost` and finite, in at most `iterations`
-/// iterations, until one lowers the cost by less than the share `tolerance`.
+/// Minimises from `values`, where the cost is `cost` and finite, in at most `iterations` iterations. Ends when an
+/// iteration lowers the cost by less than the share `tolerance`.
 pub(crate) fn minimise(
     problem: &impl LeastSquares,
     mut values: Vec<f64>,

@@ -26,7 +26,7 @@ impl FreeRun {
         {
             RunOutcome::Squared(sum) => Evaluation::Value(sum.sqrt()),
             RunOutcome::AtLeast(_) => Evaluation::AtLeast(give_up_at),
-            // Half the value if it diverges only at the end, so that a search can leave the unstable region.
+            // Half the value if the run diverges only at the end, so that a search can leave the unstable region.
             RunOutcome::Diverged(done) => {
                 Evaluation::Value(self.runner.diverged * (1.0 - 0.5 * done))
             }

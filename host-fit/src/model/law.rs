@@ -60,7 +60,7 @@ pub struct Track {
     /// Dead band of the averaged prediction error, y; 0 in files without it.
     #[serde(default)]
     pub play: f64,
-    /// Final rate of the integral relative to its first, above 0 and at most 1; 1 in files without it.
+    /// Final rate of the integral relative to its first rate, above 0 and at most 1; 1 in files without this key.
     #[serde(default = "whole")]
     pub settled: f64,
     /// Limit of bias and integral, y.

@@ -110,7 +110,7 @@ pub struct Added {
     /// The measured channel that the effect uses.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub channel: Option<String>,
-    /// The reference of that channel, in its unit, or the calibration reading of the sensor, y; see
+    /// The reference of the effect's channel, in its unit, or the calibration reading of the sensor, y; see
     /// [`reference`](Self::reference).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reference: Option<f64>,

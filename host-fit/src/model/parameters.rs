@@ -91,7 +91,7 @@ impl Model {
     }
 
     /// The sensor's offset, in units of y, within a parameter vector in the order of
-    /// [`coordinates`](Self::coordinates); 0 for a model without one.
+    /// [`coordinates`](Self::coordinates); 0 for a model without an offset.
     #[must_use]
     pub fn zero_among<T: Real>(&self, values: &[T]) -> T {
         let Some(own) = self.effects.iter().position(|e| e.name == ZERO_OFFSET.name) else {

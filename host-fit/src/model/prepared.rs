@@ -90,7 +90,7 @@ pub enum AnyDelay<T: Real> {
         factors: Vec<T>,
         /// Whether the delays are rounded to whole samples.
         rounded: bool,
-        /// For each input the nearest and the farthest sample that it can read, if known.
+        /// For each input the nearest and the farthest sample that the delay can read, if known.
         ranges: Vec<Option<(usize, usize)>>,
     },
 }

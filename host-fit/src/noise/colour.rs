@@ -100,7 +100,7 @@ impl Filter {
         whitened
     }
 
-    /// Whitens series of equal length side by side: the recursion of one waits for its own last value only.
+    /// Whitens series of equal length side by side, so that one recursion does not wait for another.
     pub(super) fn whiten_all<const N: usize>(&self, series: [&[f64]; N]) -> [Vec<f64>; N] {
         let shortest = series.iter().map(|series| series.len()).min().unwrap_or(0);
         let samples = shortest.min(self.deviations.weights.len());

@@ -13,7 +13,7 @@ pub struct Line<'a> {
     pub label: &'a str,
     /// Points on ascending coordinates.
     pub points: &'a [(f64, f64)],
-    /// Colour index of the model it belongs to; none for the ink colour of measurements.
+    /// Colour index of the curve's model; `None` for the ink colour of measurements.
     pub colour: Option<usize>,
     /// Dashed, to distinguish two curves of one model.
     pub dashed: bool,

@@ -14,7 +14,8 @@ pub(super) struct Beginning {
     pub(super) command: f64,
     /// Number of samples from the start during which y rests; 0 in mid-run.
     pub(super) rest: usize,
-    /// Number of samples from the start that may be responses to commands before the record; 0 if those are known.
+    /// Number of samples from the start that may be responses to commands before the record; 0 if these commands are
+    /// known.
     pub(super) follow: usize,
 }
 
@@ -311,9 +312,9 @@ impl Beginning {
         }
     }
 
-    /// Treats a record as one that begins at rest with an edge near its first sample, if it begins at the level
-    /// where others rest under the other level of the command, and not where the response to its own first command
-    /// ends.
+    /// Treats a record as one that begins at rest with an edge near its first sample, under two conditions: y begins at
+    /// the level where other records rest under the other command, and y does not begin at the final level of the
+    /// response to the record's first command.
     pub(super) fn recognise(beginnings: &mut [Self], records: &[Record], reference: &FirstOrder) {
         let Some(levels) = two_levels(records) else {
             return;

@@ -32,7 +32,7 @@ pub struct Preparation {
     pub records: Vec<Record>,
     /// The commands of no jet and of a full jet, in the unit of u.
     pub command: CommandRange,
-    /// Whether a full jet of that range is one of the rig, not only the largest command of the records.
+    /// Whether the full jet of `command` is that of the rig; if not, it is only the largest command of the records.
     pub full_is_known: bool,
     /// The reading without friction gain, y: the level of rest without jet, or an estimate of it.
     pub zero: f64,

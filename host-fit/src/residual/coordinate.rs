@@ -94,7 +94,7 @@ impl FailureCoordinate {
         matches!(self, Self::PulseInCycle { .. })
     }
 
-    /// Whether it counts from rising edges (true) or falling edges (false); none for other coordinates.
+    /// Whether the coordinate counts from rising edges (true) or falling edges (false); `None` for other coordinates.
     #[must_use]
     pub fn counts_from_rising(&self) -> Option<bool> {
         match self {

@@ -19,8 +19,8 @@ pub trait Problem: Sync {
     /// The variables, in the order of a point's coordinates.
     fn variables(&self) -> &[Variable];
 
-    /// The cache key of a point. Points that are equivalent for the problem (permuted or repeated delays)
-    /// should share one.
+    /// The cache key of a point. Points that are equivalent for the problem (permuted or repeated delays) should share
+    /// one key.
     fn canonical(&self, point: &[i64]) -> Point {
         point.to_vec()
     }

@@ -92,7 +92,7 @@ pub type Improve<P> = fn(
     &mut usize,
 ) -> Result<(Point, Option<Success>), StopReason>;
 
-/// An improvement that depends only on the incumbent: applied once to each, and not to its own results.
+/// An improvement that depends only on the incumbent: it is applied once to each incumbent, and not to its own results.
 pub struct Settle<P: Problem> {
     improve: Improve<P>,
     settled_at: Option<Point>,

@@ -34,7 +34,8 @@ impl Bench {
         let inner = units.records_in(&prepared.records);
         let mid_run = !prepared.at_rest;
         let options = FitOptions {
-            // Of records that start at rest, a constant is the sensor's offset: a term of the search, no free constant.
+            // Only in mid-run. For records that start at rest, the constant is the sensor's offset, which is a term of
+            // the search.
             constant: mid_run,
             ..FitOptions::default()
         };
@@ -108,7 +109,7 @@ mod tests {
     use crate::model::Start;
     use crate::residual::plants::{base, records};
 
-    /// A constant in the given model, left by a linear fit, does not make every candidate have one.
+    /// If a linear fit left a constant in the given model, the candidates still have no constant.
     #[test]
     fn a_constant_of_the_given_model_is_not_fitted_where_records_start_at_rest() {
         let records = records(&[], &[], 3);

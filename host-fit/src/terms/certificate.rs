@@ -9,7 +9,7 @@ use crate::model::Model;
 use crate::noise::NoiseModel;
 use crate::residual::NoiseSource;
 
-/// Gauss–Newton steps in the metric of the noise after least squares, and halvings of each.
+/// Number of Gauss–Newton steps in the metric of the noise after least squares, and of halvings of each step.
 const STEPS: usize = 8;
 const HALVINGS: i32 = 8;
 

@@ -34,7 +34,7 @@ impl HeldOut {
         }
     }
 
-    /// These errors, from which those along the level's scatter were removed; `measured` is Σ e² before that.
+    /// The errors without their part along the level's scatter; `measured` is Σ e² with that part.
     pub(crate) fn beside_scatter(self, measured: f64) -> Self {
         Self { measured, ..self }
     }

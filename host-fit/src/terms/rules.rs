@@ -37,7 +37,7 @@ rules! {
     /// If the error is at least this factor of the noise level when the search ends, the search is extended
     /// to less promising candidates.
     much: f64 = 1.25, "times the noise level", "models with a named effect have a smaller error";
-    /// Rounds of that extension.
+    /// Rounds of the extension of a search whose error is still high.
     rounds_after: usize = 3, "rounds", "judgement: limits the time";
     /// Factor on the number of refits in the first round of the extension.
     wider: usize = 4, "", "flow over a ramp: edge-dependent delays and vortices lower the error only together";

@@ -160,7 +160,7 @@ impl<'a> Delays<'a> {
         self.moves.iter().map(of).collect()
     }
 
-    /// The model with its lags and delays at a point; none if two of one kind coincide.
+    /// The model with its lags and delays at a point; `None` if two lags or two delays coincide.
     fn at(&self, point: &[i64]) -> Option<Model> {
         let mut model = self.model.clone();
         for (what, at) in self.moves.iter().zip(point) {

@@ -67,7 +67,7 @@ impl Unnamed {
 
 impl Screen<'_> {
     /// The part of the change by `other` that neither this model's parameters nor up to `most` columns of `unnamed`
-    /// (greedily selected) can imitate. Blocks of `block` samples of the error count as independent. `None` if it
+    /// (greedily selected) can imitate. Blocks of `block` samples of the error count as independent. `None` if `other`
     /// diverges or changes nothing.
     pub(crate) fn shown(
         &self,

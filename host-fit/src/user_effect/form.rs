@@ -32,7 +32,7 @@ struct WrittenState {
 #[derive(Debug)]
 pub(crate) struct Form {
     pub(crate) name: &'static str,
-    /// Its value: a jet strength, a drive or a reading; for a delay law the delay in samples.
+    /// Value of the effect: a jet strength, a drive or a reading; for a delay law the delay in samples.
     pub(crate) value: Program,
     /// The command after a delay law that delays edges separately.
     pub(crate) command: Option<Program>,

@@ -17,7 +17,7 @@ pub(crate) struct Source {
     reference: Option<String>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     channel: Option<String>,
-    /// Whether no number in its expressions has a unit of y or time, so that it is also valid in other units.
+    /// Whether no number in the expressions has a unit of y or time, so that it is also valid in other units.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub(super) scales: bool,
     expression: String,

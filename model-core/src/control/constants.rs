@@ -34,9 +34,9 @@ pub struct Tracking<T> {
     /// Dead band of the bias, y: deviations of the averaged prediction error that noise alone explains. 0 for
     /// none.
     pub play: T,
-    /// Final rate of the integral relative to its first, above 0 and at most 1. The rate decreases as
-    /// readings accumulate, as a Kalman gain for a constant does, and is reset when the prediction error
-    /// leaves its dead band or the reference changes; 1 keeps it constant.
+    /// Final rate of the integral relative to its first rate, above 0 and at most 1. The rate decreases as readings
+    /// accumulate, as a Kalman gain for a constant does, and is reset when the prediction error leaves its dead band or
+    /// the reference changes. With 1 the rate is constant.
     pub settled: T,
     /// Limit of bias and integral, y.
     pub correction_limit: T,

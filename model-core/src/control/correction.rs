@@ -21,7 +21,7 @@ pub(crate) struct Correction<T, const A: usize> {
     predictions: DelayLine<T, A>,
     /// Samples since the start, saturating.
     age: u32,
-    /// Rate of the integral relative to its first.
+    /// Rate of the integral relative to its first rate.
     share: T,
     /// Reference for which the integral was determined.
     reference: T,

@@ -53,7 +53,7 @@ pub struct Parameter {
     pub influence: Influence,
     /// Physically possible sign of the parameter.
     pub sign: Sign,
-    /// Its value if a model file does not contain it; `None` if it is required.
+    /// Value of the parameter if a model file does not contain it; `None` for a required parameter.
     pub left_out: Option<f64>,
 }
 
@@ -312,7 +312,7 @@ pub struct LawCard {
     /// Whether the law delays edges of the command separately, so that jets are no longer on/off. Its delays are then
     /// not rounded.
     pub shapes_command: bool,
-    /// The public fields of its type, if they are the parameters in order: generated code can then have it as
+    /// The public fields of the effect's type, if they are the parameters in order: generated code can then have it as
     /// a constant.
     pub fields: Option<&'static [&'static str]>,
 }
@@ -349,11 +349,11 @@ pub struct Spec {
     pub amplitude: Option<Amplitude>,
     /// The measured channel it needs in addition to u and y.
     pub channel: Option<&'static str>,
-    /// Whether the reference of its setting is the calibration reading of the sensor, y > 0; 1 by default.
+    /// Whether the effect's reference is the calibration reading of the sensor, y > 0; 1 by default.
     pub calibrated: bool,
     /// Further requirements.
     pub needs: Needs,
-    /// Whether it is a base term, which is never reported as missing: a constant delay, the sensor's offset.
+    /// Whether the effect is a base term, which is never reported as missing: a constant delay, the sensor's offset.
     pub base: bool,
     /// Whether a second lag of the flow has the same output for every command: the two are then always stated
     /// together.

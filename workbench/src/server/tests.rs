@@ -115,7 +115,7 @@ fn the_token_is_needed_and_differs_from_run_to_run() {
         let by_address = empty(request(Method::GET, &format!("{path}?token={token}"), None));
         assert_ne!(status(&app, by_address), StatusCode::FORBIDDEN);
     }
-    // Requests that change something need it as a header, which no form of another page can send.
+    // Requests that change something need the token as a header, which no form of another page can send.
     let post = empty(request(
         Method::POST,
         &format!("/api/cancel?token={token}"),

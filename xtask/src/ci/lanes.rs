@@ -22,7 +22,7 @@ pub(super) struct Done {
     pub(super) name: &'static str,
     /// Elapsed time, s.
     pub(super) wall: f64,
-    /// Processor time of all its processes, s; unknown if the system does not provide it.
+    /// Processor time of all processes of the step, s; unknown if the system does not provide it.
     pub(super) cpu: Option<f64>,
     /// The reason, for a step that failed.
     pub(super) failure: Option<String>,
@@ -101,7 +101,7 @@ fn next(
 }
 
 impl Progress {
-    /// Whether it has not started, its room is free, and all steps that it must follow have ended or were not
+    /// Whether the step has not started, its room is free, and all steps that it must follow have ended or were not
     /// requested.
     fn is_ready(&self, step: &Step, chosen: &[&Step]) -> bool {
         let has_ended = |name: &str| self.done.iter().any(|done| done.name == name);

@@ -18,8 +18,8 @@ pub(super) const FLASH: u32 = 0x4002_3C00;
 /// Register and bit of RCC that give a peripheral its clock.
 type Clock = (u32, u32);
 
-/// Each peripheral with its address, its length in bytes and its clock; those
-/// without have one always.
+/// Each peripheral with its address, its length in bytes and its clock; a peripheral without an entry for the clock
+/// always has one.
 pub(super) const BLOCKS: [(&str, u32, u32, Option<Clock>); 9] = [
     ("TIM2", TIM2, 0x54, Some((RCC + 0x40, 0))),
     ("IWDG", IWDG, 0x10, None),

@@ -194,7 +194,7 @@ impl Board {
         Ok(())
     }
 
-    /// Runs the program to its next access, and serves it; `None` if there was none within `patience`.
+    /// Runs the program to its next access, and serves it; `None` if there was no access within `patience`.
     fn run(&mut self, patience: Duration) -> Result<Option<u32>> {
         self.debugger.resume()?;
         let mut stop = self.debugger.stopped(patience)?;

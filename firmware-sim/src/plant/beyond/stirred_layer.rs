@@ -78,7 +78,7 @@ mod tests {
     use super::*;
     use crate::plant::flow::bench::{flow, hold};
 
-    /// With increasing rest the blowing time in the window decreases; at this time it does not yet.
+    /// A longer rest reduces the blowing time in the window, but at this time not yet.
     #[test]
     fn recent_blowing_sets_the_rate() {
         let law = StirredLayer {

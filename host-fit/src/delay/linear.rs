@@ -449,7 +449,7 @@ pub(crate) fn refine(
                 delta_h
             },
             1e-4,
-            // Of an integrator, with a very long S, b is very small.
+            // For an integrator S is very long, and b is very small.
             (1e-2 * plant.ratio).clamp(1e-7, 1e-4),
             delta_h,
             1e-4,

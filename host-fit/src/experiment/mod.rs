@@ -32,7 +32,7 @@ pub struct Limits {
 }
 
 impl Default for Limits {
-    /// 20 ms on and off, 10 s.
+    /// Shortest times of 20 ms on and off, and a record of 10 s.
     fn default() -> Self {
         Self {
             min_on_s: 0.02,

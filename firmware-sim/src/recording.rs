@@ -53,10 +53,10 @@ impl Units {
     pub const OWN: Self = Self { time: 1.0, y: 1.0 };
 }
 
-/// A data set with the rig that made it.
+/// A data set with its readings without noise.
 #[derive(Debug, Clone)]
 pub struct Recorded {
-    /// The data that a user of the tool would have.
+    /// The data set, as a user of the tool has it.
     pub data: DataSet,
     /// The readings without noise, per record in the order of the data set (recorded y).
     pub noise_free: Vec<Vec<f64>>,

@@ -150,7 +150,7 @@ impl<L: Law> Controller<L> {
         }
     }
 
-    /// Closes the valve until the law is armed again, which keeps its settings; returns whether a law was running.
+    /// Closes the valve until the law is armed again. The law keeps its settings. Returns whether a law was running.
     pub fn pause(&mut self) -> bool {
         let runs = self.is_running();
         if runs {

@@ -76,9 +76,9 @@ const RAIL: f64 = 8.0;
 /// The measured channel of a rig, stated by the user.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ChannelSaid {
-    /// Name of the output.
+    /// Name of the channel.
     pub name: String,
-    /// Unit of the output.
+    /// Unit of the channel.
     pub unit: String,
     /// Counts at 0.
     pub zero_counts: f64,

@@ -273,7 +273,7 @@ mod tests {
             "b 1.0.0: no licence",
             "c 1.0.0: from git",
             "c 2.0.0: licence MPL",
-            "c: in versions 1.0.0, 2.0.0",
+            "c: the versions 1.0.0, 2.0.0",
             "gone: ",
         ] {
             assert!(found.contains(part), "{part}: {found}");

@@ -87,7 +87,7 @@ pub(crate) fn experiment_picture(separation: &Separation) -> Picture {
         .map(|(index, (label, y))| LoopRun {
             label,
             y,
-            // All controllers get the same command.
+            // All models get the same command.
             u: if index == 0 { &experiment.u } else { &[] },
             air: &[],
         })

@@ -101,8 +101,7 @@ pub(crate) struct Descent {
     pub(crate) cost: f64,
     pub(crate) iterations: usize,
     pub(crate) stop: FitStop,
-    /// The last linearisation and its JᵀJ (row-major); from before the last iteration if that lowered the
-    /// cost.
+    /// The last linearisation and its JᵀJ (row-major). If the last iteration lowered the cost, both are from before it.
     pub(crate) linearised: Option<(Vec<Part>, Vec<f64>)>,
 }
 

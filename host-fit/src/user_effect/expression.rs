@@ -21,7 +21,7 @@ const SUBSET: &str = "allowed are numbers, names, + - * /, comparisons, && || !,
 /// A problem of an expression, with its position.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Fault {
-    /// Line of the file, from 1.
+    /// Line of the expression, from 1.
     pub(super) line: usize,
     /// Column, in characters from 1.
     pub(super) column: usize,

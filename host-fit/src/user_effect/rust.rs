@@ -77,7 +77,7 @@ struct Writer {
 struct Field {
     name: Ident,
     kind: TokenStream,
-    /// Initialiser of the variable; none if a result has its name.
+    /// Initial value of the field; `None` if the value is a variable with the field's name.
     value: Option<TokenStream>,
 }
 

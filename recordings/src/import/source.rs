@@ -80,7 +80,7 @@ pub(super) struct Unread {
     pub(super) name: String,
     /// Line of the first such cell.
     pub(super) line: u64,
-    /// Contents of the file.
+    /// Contents of that cell.
     pub(super) text: String,
 }
 

@@ -428,7 +428,7 @@ fn model(sheet: &Sheet<'_>, c: &C) -> String {
     }
     w.push_str("    push(s->y, OUTPUTS, &s->y_newest, flow);\n}\n");
     if matches!(sheet.law(), Some(Law::Track(_))) {
-        w.push_str("\n/* The same for predictions of the law, with a less accurate average. */\nstatic void foresee(struct model *s, real flow, real next)\n{\n");
+        w.push_str("\n/* Stores a flow state that the law predicts, with a less accurate average. */\nstatic void foresee(struct model *s, real flow, real next)\n{\n");
         if average {
             w.push_str("    s->sum_low = s->sum_low + (flow - back(s->y, OUTPUTS, s->y_newest, WINDOW - 1u));\n");
         } else {

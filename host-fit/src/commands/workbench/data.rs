@@ -71,7 +71,7 @@ impl Uploads {
         match self.names().iter().any(|known| known == name) {
             true => Ok(self.0.join(name)),
             false => Err(Refusal(format!(
-                "no file `{name}` was uploaded; drop it first"
+                "no file `{name}` was uploaded; drop it on the page first"
             ))),
         }
     }

@@ -71,7 +71,7 @@ impl PulseWidth {
         }
     }
 
-    /// The same with a Smith predictor on the model `flow`.
+    /// Adds a Smith predictor on the model `flow`.
     #[must_use]
     pub fn with_smith(mut self, flow: FirstOrder) -> Self {
         let delay = (flow.delay_s / self.period_s).round().max(1.0) as usize;

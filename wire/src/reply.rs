@@ -8,7 +8,8 @@ pub const PROTOCOL: u8 = 2;
 /// A host without a message for this time counts as lost, ms. The command that it plays then ends.
 pub const LOST_AFTER_MS: u32 = 500;
 
-/// The same in samples of `period_us`, at least ten, because the board receives at most one message per sample.
+/// [`LOST_AFTER_MS`] in samples of `period_us`, at least ten, because the board receives at most one message per
+/// sample.
 ///
 /// ```
 /// use wire::reply::lost_after_samples;

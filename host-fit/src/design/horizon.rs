@@ -123,7 +123,7 @@ impl HorizonSearch<'_> {
                 });
                 grown.collect::<Vec<_>>()
             };
-            // Kept in beam order, whatever the thread timing.
+            // Kept in beam order, so that the result does not depend on the threads.
             let grown = parallel::each(&beam, grow).into_iter().flatten();
             let finite = |node: &Node| node.promise.is_finite();
             let mut grown: Vec<Node> = grown.filter(finite).collect();
@@ -198,7 +198,7 @@ pub(super) fn cycle(command: &[bool], shortest: usize) -> Option<(usize, f64)> {
             let differ = late.iter().zip(early).filter(|(a, b)| a != b).count();
             (period, differ as f64 / period as f64)
         })
-        // Among equals the shortest period.
+        // Of equally good periods the shortest.
         .min_by(|a, b| a.1.total_cmp(&b.1))
 }
 

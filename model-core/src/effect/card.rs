@@ -199,7 +199,8 @@ impl StartValue {
 pub enum Starts {
     /// All combinations of the parameters' starting values.
     Grid,
-    /// These rows, with one value per parameter: for parameters that depend on each other or on the data.
+    /// A list of starting points, each with one value per parameter: for parameters that depend on each other or on the
+    /// data.
     Rows(&'static [&'static [StartValue]]),
 }
 

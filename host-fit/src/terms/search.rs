@@ -24,11 +24,11 @@ use std::sync::atomic::{AtomicBool, Ordering as Memory};
 pub struct Hypothesis {
     /// The terms.
     pub terms: Vec<Term>,
-    /// Its fits and its validation error.
+    /// Fits and validation error of the model.
     pub judged: Judged,
-    /// Whether further terms were already screened on it.
+    /// Whether further terms were already screened on the hypothesis.
     pub(super) expanded: bool,
-    /// Whether it descends from the given structure instead of from the lowest-order model.
+    /// Whether the hypothesis descends from the given structure instead of from the lowest-order model.
     pub(super) from_given: bool,
     /// Whether an effect is at a bound of its range. Further terms are screened on such a hypothesis, but it cannot
     /// be a result.
@@ -59,13 +59,13 @@ impl Hypothesis {
         }
     }
 
-    /// Whether it has no effect among its terms.
+    /// Whether the hypothesis has no effect among its terms.
     #[must_use]
     pub fn is_bare(&self) -> bool {
         self.terms.iter().all(|term| term.effect().is_none())
     }
 
-    /// Number of parameters of its terms, as the penalty counts them.
+    /// Number of parameters of the terms, as the penalty counts them.
     #[must_use]
     pub fn cost(&self) -> usize {
         self.terms.iter().map(Term::cost).sum()
@@ -95,7 +95,7 @@ impl Hypothesis {
             .min_by(|a, b| a.judged.rmse().total_cmp(&b.judged.rmse()))
     }
 
-    /// Its terms in words.
+    /// The terms in words.
     #[must_use]
     pub fn words(&self) -> String {
         let names: Vec<String> = self.terms.iter().map(Term::name).collect();
@@ -685,7 +685,7 @@ impl Search<'_> {
         rest
     }
 
-    /// The same, starting from `model`, which already lacks the term.
+    /// A hypothesis refitted without one of its terms, starting from `model`, which already lacks it.
     pub(super) fn less(
         &self,
         hypothesis: &Hypothesis,
@@ -717,7 +717,7 @@ fn keep(all: &mut Vec<Hypothesis>, mut hypothesis: Hypothesis) {
         _ => hypothesis.score() < other.score(),
     };
     if better {
-        // Candidates were screened on it already, unless its terms have changed.
+        // Candidates were already screened on this hypothesis, unless its terms have changed.
         hypothesis.expanded = other.expanded && hypothesis.score() > other.score() - RULES.price;
         *other = hypothesis;
     }

@@ -1,15 +1,17 @@
 //! A model and its law in other languages than Rust: one readable file each.
 //!
-//! The recursion, the delays and the law are written for each language. Effects and delay laws come from one
-//! description ([`forms.toml`](../../user_effect/forms.toml) and the user's own effects), which each language's
-//! printer writes out.
+//! The recursion, the delays and the law stand in a template for each language (`model.py` …). Effects and delay
+//! laws come from one description ([`forms.toml`](../../user_effect/forms.toml) and the user's own effects), which
+//! each language's printer writes out.
 
 mod c;
+mod common;
 mod matlab;
 mod piece;
 mod plain;
 mod python;
 mod sheet;
+mod template;
 
 use super::{CodegenError, check};
 use crate::model::Model;

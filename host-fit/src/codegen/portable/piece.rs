@@ -55,6 +55,30 @@ pub(super) trait Tongue {
     fn push(&self, line: &str, value: &str) -> String;
     /// The value of a memory this many samples back, interpolated between that sample and the preceding one.
     fn read(&self, line: &str, samples: Tapped<'_>) -> String;
+    /// A comment above constants.
+    fn heading(&self, text: &str) -> String;
+    /// The definition of a constant, with an explanation if `remark` is not empty.
+    fn define(&self, name: &str, value: &str, remark: &str) -> String;
+    /// A number as the value of a constant.
+    fn constant(&self, value: f64) -> String {
+        self.number(value)
+    }
+    /// A whole number as the value of a constant.
+    fn whole(&self, value: u32) -> String {
+        value.to_string()
+    }
+    /// The definition of a constant that follows from others.
+    fn derived(&self, constant: &Constant) -> String {
+        self.define(&constant.name, &constant.formula, "")
+    }
+    /// The definition of the length of a memory, if the language needs one.
+    fn length(&self, line: &str, samples: usize) -> Option<String>;
+    /// The name of a constant of the law.
+    fn law_name(&self, name: &str) -> String {
+        name.to_owned()
+    }
+    /// The statements of an effect with its name.
+    fn block(&self, name: &str, statements: &[String]) -> String;
 }
 
 /// Where a memory is read.
@@ -157,12 +181,8 @@ impl Piece {
     fn operands(op: &Op) -> Vec<Register> {
         match op {
             // A constant delay is a fixed position in the memory.
-            Op::Delayed {
-                signal,
-                longest: None,
-                ..
-            } => vec![*signal],
-            Op::Delayed { signal, delay, .. } => vec![*signal, *delay],
+            Op::Delayed(d) if d.longest.is_none() => vec![d.signal],
+            Op::Delayed(d) => vec![d.signal, d.delay],
             op => op.operands().collect(),
         }
     }
@@ -250,7 +270,7 @@ impl Piece {
     }
 
     /// The constants that the piece needs.
-    pub(super) fn constants(&self, tongue: &impl Tongue) -> Vec<Constant> {
+    pub(super) fn constants(&self, tongue: &dyn Tongue) -> Vec<Constant> {
         let each = self.constants.iter().filter_map(|register| {
             Some(Constant {
                 name: self.constant_name(*register)?,
@@ -261,13 +281,12 @@ impl Piece {
         each.collect()
     }
 
-    fn text(&self, register: Register, tongue: &impl Tongue) -> Text {
+    fn text(&self, register: Register, tongue: &dyn Tongue) -> Text {
         if let Some(name) = self.constant_name(register) {
             return Text::atom(name);
         }
         let named = !self.once(register)
-            && (self.uses[register] > 1
-                || matches!(self.program.ops[register], Op::Delayed { .. }));
+            && (self.uses[register] > 1 || matches!(self.program.ops[register], Op::Delayed(_)));
         let simple = matches!(
             self.program.ops[register],
             Op::Signal(
@@ -288,7 +307,7 @@ impl Piece {
         self.right_side(register, tongue)
     }
 
-    fn right_side(&self, register: Register, tongue: &impl Tongue) -> Text {
+    fn right_side(&self, register: Register, tongue: &dyn Tongue) -> Text {
         let of = |r: Register| self.text(r, tongue);
         let [and, or, not, unequal] = tongue.logic();
         let infix = |x: Register, sign: &str, y: Register, binds: u8| {
@@ -340,24 +359,15 @@ impl Piece {
                 Binary::And => Text::atom(format!("(({}) {and} ({}))", of(x).0, of(y).0)),
                 Binary::Or => Text::atom(format!("(({}) {or} ({}))", of(x).0, of(y).0)),
             },
-            Op::Select {
-                condition,
-                then,
-                otherwise,
-            } => {
+            Op::Select(condition, then, otherwise) => {
                 let (condition, then) = (of(condition).0, of(then).within(LOOSEST));
                 Text::atom(tongue.select(&condition, &then, &of(otherwise).0))
             }
-            Op::Delayed {
-                line,
-                delay,
-                longest,
-                ..
-            } => {
-                let (whole, fraction) = self.taps.get(line).copied().unwrap_or_default();
-                let name = self.line(line);
-                Text::atom(if longest.is_some() {
-                    let quotient = format!("{} / PERIOD", of(delay).within(PRODUCT));
+            Op::Delayed(d) => {
+                let (whole, fraction) = self.taps.get(d.line).copied().unwrap_or_default();
+                let name = self.line(d.line);
+                Text::atom(if d.longest.is_some() {
+                    let quotient = format!("{} / PERIOD", of(d.delay).within(PRODUCT));
                     let most = tongue.number(self.values[register]);
                     let samples = tongue.call(Function::Min, &[quotient, most]);
                     tongue.read(&name, Tapped::Varying(&samples))
@@ -369,16 +379,16 @@ impl Piece {
     }
 
     /// The statements of a sample, and the resulting value.
-    pub(super) fn statements(&self, tongue: &impl Tongue) -> (Vec<String>, String) {
+    pub(super) fn statements(&self, tongue: &dyn Tongue) -> (Vec<String>, String) {
         let program = self.program;
         let mut lines = Vec::new();
         for (register, op) in program.ops.iter().enumerate() {
             if self.once(register) {
                 continue;
             }
-            if let Op::Delayed { line, signal, .. } = op {
-                let signal = self.text(*signal, tongue).0;
-                lines.push(tongue.push(&self.line(*line), &signal));
+            if let Op::Delayed(d) = op {
+                let signal = self.text(d.signal, tongue).0;
+                lines.push(tongue.push(&self.line(d.line), &signal));
             }
             let name = self.local(register);
             if self.text(register, tongue).0 == name {

@@ -10,20 +10,63 @@ pub mod laws;
 pub mod lockstep;
 pub mod strangers;
 
+use std::ffi::OsStr;
 use std::path::PathBuf;
 use std::process::Command;
 
 /// Options of a `design` whose contract is tested, not its law: trials of half the length, and a coarse robustness margin.
-pub const QUICK_DESIGN: [&str; 8] = [
-    "--set",
-    "design.trial=6000",
-    "--set",
-    "design.trial-from=2000",
-    "--set",
-    "design.margin-rays=4",
-    "--set",
-    "design.margin-bisections=2",
-];
+pub const QUICK_DESIGN: &str = "--set design.trial=6000 --set design.trial-from=2000 --set design.margin-rays=4 \
+     --set design.margin-bisections=2";
+
+/// Paths and other words of a command.
+pub type Parts<'a> = &'a [&'a dyn AsRef<OsStr>];
+
+/// `host-fit` with the words of `line`. Each `{}` stands for the next of `parts`, which may contain spaces.
+#[must_use]
+pub fn host_fit(line: &str, parts: Parts<'_>) -> Command {
+    let mut command = Command::new(program());
+    let mut parts = parts.iter();
+    for word in line.split_whitespace() {
+        match parts.as_slice() {
+            [part, ..] if word == "{}" => {
+                command.arg(part);
+                parts.next();
+            }
+            _ => {
+                command.arg(word);
+            }
+        }
+    }
+    command
+}
+
+/// The file of a model with a first-order flow, a guess like one made by hand; `delay` are the keys of its delay.
+#[must_use]
+pub fn first_order(a: f64, b: f64, delay: &str) -> String {
+    format!(
+        "format_version = 1
+sample_period_s = 0.001
+lag_convention = \"one-step\"
+[structure]
+averaged = false
+\
+         window = 250
+state_lags = [1]
+product_lags = [1]
+[coefficients]
+a = [{a}]
+b = [{b}]
+c = [[0.0]]
+\
+         [delay]
+{delay}
+"
+    )
+}
+
+/// A constant delay for [`first_order`].
+pub const FIXED_DELAY: &str = "law = \"fixed\"
+delays = [40]";
 
 /// The program `host-fit`, built beside the running test or tool.
 ///

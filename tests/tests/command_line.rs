@@ -1,14 +1,14 @@
 //! The program from the user's side: exit codes, JSON shapes, messages, files.
 
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::Output;
 
 use host_fit::data::DataSet;
 use host_fit::model::{Law, Model};
 use host_fit::user_effect::Definition;
 use model_core::recursion::LagConvention;
 use scenarios::campaign::Part;
-use scenarios::{QUICK_DESIGN, program};
+use scenarios::{FIXED_DELAY, Parts, QUICK_DESIGN, first_order, host_fit};
 use serde_json::Value;
 
 fn data(name: &str) -> PathBuf {
@@ -17,22 +17,13 @@ fn data(name: &str) -> PathBuf {
         .join(name)
 }
 
-fn run(arguments: &[&Path]) -> Output {
-    Command::new(program())
-        .args(arguments)
-        .output()
-        .expect("the program starts")
-}
-
-fn p(text: &str) -> &Path {
-    Path::new(text)
+fn run(line: &str, parts: Parts<'_>) -> Output {
+    host_fit(line, parts).output().expect("the program starts")
 }
 
 #[track_caller]
-fn json(arguments: &[&Path]) -> Value {
-    let mut all = vec![p("--json")];
-    all.extend(arguments);
-    let output = run(&all);
+fn json(line: &str, parts: Parts<'_>) -> Value {
+    let output = run(&format!("--json {line}"), parts);
     let error = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(0), "{error}");
     serde_json::from_slice(&output.stdout).expect("one JSON document and nothing else")
@@ -40,8 +31,8 @@ fn json(arguments: &[&Path]) -> Value {
 
 /// Exit 1, one paragraph with every part, nothing on standard output.
 #[track_caller]
-fn refused(arguments: &[&Path], parts: &[&str]) {
-    let output = run(arguments);
+fn refused(line: &str, parts: Parts<'_>, told: &[&str]) {
+    let output = run(line, parts);
     let error = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(output.status.code(), Some(1), "{error}");
     assert!(output.stdout.is_empty());
@@ -50,68 +41,69 @@ fn refused(arguments: &[&Path], parts: &[&str]) {
         "{error}"
     );
     assert!(!error.contains("panicked"), "{error}");
+    contains_all(&error, told);
+}
+
+#[track_caller]
+fn contains_all(text: &str, parts: &[&str]) {
     for part in parts {
-        assert!(error.contains(part), "no `{part}` in: {error}");
+        assert!(text.contains(part), "no `{part}` in: {text}");
     }
 }
 
 #[track_caller]
-fn keys(value: &Value, expected: &[&str]) {
+fn number(value: &Value) -> f64 {
+    value.as_f64().expect("a number")
+}
+
+/// A quick design.
+fn quick(line: &str) -> String {
+    format!("{line} {QUICK_DESIGN}")
+}
+
+/// A model with a state-dependent delay.
+fn table_two() -> PathBuf {
+    data("paper/table-2-state-dependent.toml")
+}
+
+#[track_caller]
+fn keys(value: &Value, expected: &str) {
     let object = value.as_object().expect("an object");
-    for key in expected {
-        assert!(object.contains_key(*key), "no key `{key}` in {value}");
+    for key in expected.split_whitespace() {
+        assert!(object.contains_key(key), "no key `{key}` in {value}");
     }
 }
 
-const INDICATORS: [&str; 8] = [
-    "name",
-    "use",
-    "samples",
-    "epsilon",
-    "fit_percent",
-    "correlation",
-    "rmse",
-    "noise_rmse",
-];
+const INDICATORS: &str = "name use samples epsilon fit_percent correlation rmse noise_rmse";
 
 #[test]
 fn wrong_usage_is_exit_2() {
-    for arguments in [
-        &["nonsense"][..],
-        &["compare"],
-        &["extend", "a", "b", "-o", "c"],
-        &["simulate", "a", "b"],
-    ] {
-        let paths: Vec<&Path> = arguments.iter().map(|a| p(a)).collect();
-        assert_eq!(run(&paths).status.code(), Some(2), "{arguments:?}");
+    for line in ["nonsense", "compare", "extend a b -o c", "simulate a b"] {
+        assert_eq!(run(line, &[]).status.code(), Some(2), "{line}");
     }
-    assert_eq!(run(&[p("--help")]).status.code(), Some(0));
+    assert_eq!(run("--help", &[]).status.code(), Some(0));
 }
 
 /// `--set` changes a rule for one run, and the decision that depends on it.
 #[test]
 fn a_rule_is_changed_for_a_run() {
-    let listed = |change: &[&str]| {
-        let mut arguments = vec![p("rules"), p("delay")];
-        arguments.extend(change.iter().map(|text| p(text)));
-        let books = json(&arguments);
+    let listed = |change: &str| {
+        let books = json(&format!("rules delay {change}"), &[]);
         let rules = books[0]["rules"].as_array().expect("rules").clone();
         let rule = rules.iter().find(|rule| rule["name"] == "worst-error");
         rule.expect("the rule")["value"].as_f64()
     };
-    assert_eq!(listed(&[]), Some(5.0));
-    let change = ["--set", "delay.worst-error=0.06"];
-    assert_eq!(listed(&change), Some(0.06));
+    assert_eq!(listed(""), Some(5.0));
+    let change = "--set delay.worst-error=0.06";
+    assert_eq!(listed(change), Some(0.06));
     let ramp = data("hidden-ramp");
-    let edges = |change: &[&str]| {
-        let mut arguments = vec![p("delay"), ramp.as_path()];
-        arguments.extend(change.iter().map(|text| p(text)));
-        let answer = json(&arguments);
+    let edges = |change: &str| {
+        let answer = json(&format!("delay {{}} {change}"), &[&ramp]);
         answer["statistics"]["all"]["count"]
             .as_u64()
             .expect("a count")
     };
-    assert!(edges(&change) < edges(&[]));
+    assert!(edges(change) < edges(""));
     for (change, part) in [
         ("level=0.1", "write terms.level or diagnose.level"),
         (
@@ -120,7 +112,7 @@ fn a_rule_is_changed_for_a_run() {
         ),
         ("no-such=1", "there is no rule `no-such`"),
     ] {
-        let output = run(&[p("rules"), p("--set"), p(change)]);
+        let output = run("rules --set {}", &[&change]);
         assert_eq!(output.status.code(), Some(2));
         assert!(String::from_utf8_lossy(&output.stderr).contains(part));
     }
@@ -128,20 +120,19 @@ fn a_rule_is_changed_for_a_run() {
 
 #[test]
 fn compare_prints_the_indicators_of_the_contract() {
-    let model = data("paper/table-2-state-dependent.toml");
-    let found = json(&[p("compare"), &model, &data("paper-like")]);
-    keys(&found, &["records", "identify", "validate", "where"]);
+    let model = table_two();
+    let found = json("compare {} {}", &[&model, &data("paper-like")]);
+    keys(&found, "records identify validate where");
     let records = found["records"].as_array().expect("records");
     assert_eq!(records.len(), 6);
     for record in records
         .iter()
         .chain([&found["identify"], &found["validate"]])
     {
-        keys(record, &INDICATORS);
+        keys(record, INDICATORS);
         assert!(record["noise_rmse"].is_null(), "no y_sd in this set");
     }
     // ε² of the records add up; RMSE = ε/√n.
-    let number = |value: &Value| value.as_f64().expect("a number");
     let of = |role: &str| {
         let all = records.iter().filter(|r| r["use"] == role);
         all.map(|r| number(&r["epsilon"]).powi(2))
@@ -159,43 +150,28 @@ fn compare_prints_the_indicators_of_the_contract() {
 
 #[test]
 fn several_models_are_compared_side_by_side() {
-    let models = [
-        data("paper/table-2-fixed.toml"),
-        data("paper/table-2-state-dependent.toml"),
-    ];
+    let models = [data("paper/table-2-fixed.toml"), table_two()];
     let folder = tempfile::tempdir().expect("a folder");
     let set = part_of_the_ramp(folder.path());
-    let found = json(&[p("compare"), &models[0], &models[1], &set]);
+    let found = json("compare {} {} {}", &[&models[0], &models[1], &set]);
     let listed = found["models"].as_array().expect("models");
     assert_eq!(listed.len(), 2);
     for (listed, model) in listed.iter().zip(&models) {
         keys(
             listed,
-            &[
-                "model",
-                "parameters",
-                "effects",
-                "records",
-                "identify",
-                "validate",
-                "where",
-            ],
+            "model parameters effects records identify validate where",
         );
         // The result for each model equals that for the model alone.
-        let alone = json(&[p("compare"), model, &set]);
+        let alone = json("compare {} {}", &[&model, &set]);
         assert_eq!(listed["records"], alone["records"]);
         let name = model.file_stem().expect("a name").to_string_lossy();
         assert_eq!(listed["model"], name.as_ref());
     }
     let page = folder.path().join("out.html");
-    let output = run(&[
-        p("compare"),
-        &models[0],
-        &models[1],
-        &set,
-        p("--report"),
-        &page,
-    ]);
+    let output = run(
+        "compare {} {} {} --report {}",
+        &[&models[0], &models[1], &set, &page],
+    );
     let text = String::from_utf8(output.stdout).expect("text");
     assert!(
         text.contains("table-2-fixed ") && text.contains("RMSE / noise"),
@@ -208,7 +184,7 @@ fn several_models_are_compared_side_by_side() {
 #[test]
 fn a_model_is_written_in_every_language() {
     let folder = tempfile::tempdir().expect("a folder");
-    let model = data("paper/table-2-state-dependent.toml");
+    let model = table_two();
     for (language, file, holds) in [
         ("rust", "x.rs", "pub const STATE_LAGS"),
         (
@@ -220,14 +196,7 @@ fn a_model_is_written_in_every_language() {
         ("matlab", "x.m", "function [y, s] = x(u, s, channels, more)"),
     ] {
         let path = folder.path().join(file);
-        let output = run(&[
-            p("codegen"),
-            &model,
-            p("--lang"),
-            p(language),
-            p("-o"),
-            &path,
-        ]);
+        let output = run("codegen {} --lang {} -o {}", &[&model, &language, &path]);
         assert_eq!(output.status.code(), Some(0), "{language}");
         let text = std::fs::read_to_string(&path).expect("the file");
         assert!(text.contains(holds), "{text}");
@@ -239,16 +208,11 @@ fn a_comparison_leaves_a_page_and_pictures() {
     let folder = tempfile::tempdir().expect("a folder");
     let page = folder.path().join("out.html");
     let pictures = folder.path().join("pictures");
-    let model = data("paper/table-2-state-dependent.toml");
-    let output = run(&[
-        p("compare"),
-        &model,
-        &data("hidden-ramp"),
-        p("--report"),
-        &page,
-        p("--pictures"),
-        &pictures,
-    ]);
+    let model = table_two();
+    let output = run(
+        "compare {} {} --report {} --pictures {}",
+        &[&model, &data("hidden-ramp"), &page, &pictures],
+    );
     assert_eq!(output.status.code(), Some(0));
     let text = String::from_utf8(output.stdout).expect("text");
     assert!(
@@ -275,9 +239,9 @@ fn simulate_is_the_models_free_run() {
         text.push_str(&format!("{:.3},{u}\n", k as f64 * 0.001));
     }
     std::fs::write(&input, text).expect("written");
-    let path = data("paper/table-2-state-dependent.toml");
-    let found = json(&[p("simulate"), &path, &input, p("-o"), &out]);
-    keys(&found, &["model", "output", "samples"]);
+    let path = table_two();
+    let found = json("simulate {} {} -o {}", &[&path, &input, &out]);
+    keys(&found, "model output samples");
     let model = host_fit::model::Model::load(&path).expect("bundled");
     let expected = model
         .run_free(&host_fit::simulate::Signals::commanded(&model, &u))
@@ -310,39 +274,27 @@ fn extend_finds_the_hidden_plenum() {
     let folder = tempfile::tempdir().expect("a folder");
     let ramp = part_of_the_ramp(folder.path());
     let out = folder.path().join("new.toml");
-    let arguments = [
-        p("extend"),
-        &data("paper/table-2-state-dependent.toml"),
-        &ramp,
-        p("--effect"),
-        p("plenum-droop"),
-        p("-o"),
-        &out,
-    ];
-    let found = json(&arguments);
-    keys(
-        &found,
-        &["model", "effect", "parameters", "before", "after"],
-    );
-    keys(&found["before"], &INDICATORS);
-    keys(&found["after"], &INDICATORS);
+    let again = || {
+        let line = "extend {} {} --effect plenum-droop -o {}";
+        json(line, &[&table_two(), &ramp, &out])
+    };
+    let found = again();
+    keys(&found, "model effect parameters before after");
+    keys(&found["before"], INDICATORS);
+    keys(&found["after"], INDICATORS);
     assert_eq!(found["effect"], "plenum-droop");
-    let number = |value: &Value| value.as_f64().expect("a number");
     // The truth is in answer.toml: 0.840 s and 0.386 1/s.
     let parameter = |name: &str| number(&found["parameters"][name]["value"]);
     assert!((parameter("recovery_time") / 0.8403 - 1.0).abs() < 0.1);
     assert!((parameter("depletion_rate") / 0.3859 - 1.0).abs() < 0.1);
-    keys(
-        &found["parameters"]["recovery_time"],
-        &["value", "unit", "low", "high"],
-    );
+    keys(&found["parameters"]["recovery_time"], "value unit low high");
     let after = &found["after"];
     assert!(number(&after["rmse"]) < 1.05 * number(&after["noise_rmse"]));
     // The same run again gives the same file, and the written model has the printed error.
     let first = std::fs::read(&out).expect("written");
-    json(&arguments);
+    again();
     assert_eq!(std::fs::read(&out).expect("written"), first);
-    let compared = json(&[p("compare"), &out, &ramp]);
+    let compared = json("compare {} {}", &[&out, &ramp]);
     assert_eq!(compared["validate"]["rmse"], after["rmse"]);
 }
 
@@ -354,56 +306,32 @@ fn diagnose_names_the_hidden_plenum() {
         folder.path().join("new.toml"),
         folder.path().join("out.html"),
     );
-    let found = json(&[
-        p("diagnose"),
-        &data("paper/table-2-state-dependent.toml"),
-        &ramp,
-        p("--report"),
-        &page,
-        p("-o"),
-        &out,
-    ]);
-    keys(
-        &found,
-        &["verdict", "missing", "ladder", "ranking", "where"],
+    let found = json(
+        "diagnose {} {} --report {} -o {}",
+        &[&table_two(), &ramp, &page, &out],
     );
+    keys(&found, "verdict missing ladder ranking where");
     assert_eq!(found["verdict"], "effect-missing");
     assert_eq!(found["missing"], serde_json::json!(["plenum-droop"]));
     let ladder = found["ladder"].as_array().expect("a list");
     for rung in ladder {
         keys(
             rung,
-            &[
-                "effects",
-                "validate_rmse",
-                "validate_fit_percent",
-                "noise_rmse",
-            ],
+            "effects validate_rmse validate_fit_percent noise_rmse",
         );
     }
     assert_eq!(ladder[0]["effects"], serde_json::json!([]));
     let first = &found["ranking"][0];
     keys(
         first,
-        &[
-            "effect",
-            "validate_rmse",
-            "error_reduction_percent",
-            "p_value",
-            "parameters",
-            "confounded_with",
-        ],
+        "effect validate_rmse error_reduction_percent p_value parameters confounded_with",
     );
     assert_eq!(first["effect"], "plenum-droop");
-    keys(
-        &first["parameters"]["recovery_time"],
-        &["value", "unit", "low", "high"],
-    );
-    let number = |value: &Value| value.as_f64().expect("a number");
+    keys(&first["parameters"]["recovery_time"], "value unit low high");
     let last = ladder.last().expect("a rung");
     assert!(number(&last["validate_rmse"]) < 1.05 * number(&last["noise_rmse"]));
     // The written models have the errors of the ladder, before and after.
-    let after = json(&[p("compare"), &out, &ramp]);
+    let after = json("compare {} {}", &[&out, &ramp]);
     let apart = number(&after["validate"]["rmse"]) / number(&last["validate_rmse"]) - 1.0;
     assert!(apart.abs() < 1e-9, "{apart}");
     let page = std::fs::read_to_string(&page).expect("a page");
@@ -412,7 +340,7 @@ fn diagnose_names_the_hidden_plenum() {
 
 #[test]
 fn the_catalogue_is_listed_whole() {
-    let found = json(&[p("effects")]);
+    let found = json("effects", &[]);
     let names: Vec<&str> = found
         .as_array()
         .expect("a list")
@@ -421,7 +349,7 @@ fn the_catalogue_is_listed_whole() {
         .collect();
     let catalogue = model_core::effects::SPECS.iter();
     assert_eq!(names, catalogue.map(|spec| spec.name).collect::<Vec<_>>());
-    let text = String::from_utf8(run(&[p("effects")]).stdout).expect("text");
+    let text = String::from_utf8(run("effects", &[]).stdout).expect("text");
     assert!(names.iter().all(|name| text.contains(name)));
 }
 
@@ -433,22 +361,28 @@ fn bad_input_is_one_paragraph_and_leaves_no_file() {
         std::fs::write(&path, text).expect("written");
         path
     };
-    let model = data("paper/table-2-state-dependent.toml");
+    let model = table_two();
     let out = folder.path().join("never.toml");
     let nan = file("nan.csv", "t,u,y\n0,0,0\n0.001,1,nan\n0.002,1,0\n");
     refused(
-        &[p("compare"), &model, &nan],
+        "compare {} {}",
+        &[&model, &nan],
         &["nan.csv", "line 3", "column `y`"],
     );
     let slow = file("slow.csv", "t,u,y\n0,0,0\n0.01,1,0\n0.02,1,0\n");
-    refused(&[p("compare"), &model, &slow], &["sample_period_s", "0.01"]);
+    refused(
+        "compare {} {}",
+        &[&model, &slow],
+        &["sample_period_s", "0.01"],
+    );
     let text = std::fs::read_to_string(&model).expect("bundled");
     let version = file(
         "version.toml",
         &text.replace("format_version = 1", "format_version = 7"),
     );
     refused(
-        &[p("compare"), &version, &data("paper-like")],
+        "compare {} {}",
+        &[&version, &data("paper-like")],
         &["version.toml", "format_version"],
     );
     let short = file(
@@ -456,24 +390,19 @@ fn bad_input_is_one_paragraph_and_leaves_no_file() {
         &text.replace("b = [0.008]", "b = [0.008, 0.1]"),
     );
     refused(
-        &[p("compare"), &short, &data("paper-like")],
+        "compare {} {}",
+        &[&short, &data("paper-like")],
         &["short.toml", "coefficients"],
     );
     refused(
-        &[p("compare"), &model, &folder.path().join("none")],
+        "compare {} {}",
+        &[&model, &folder.path().join("none")],
         &["none"],
     );
-    let extend = |effect: &str, parts: &[&str]| {
-        let arguments = [
-            p("extend"),
-            &model,
-            &data("hidden-ramp"),
-            p("--effect"),
-            p(effect),
-            p("-o"),
-            &out,
-        ];
-        refused(&arguments, parts);
+    let ramp = data("hidden-ramp");
+    let extend = |effect: &str, told: &[&str]| {
+        let line = "extend {} {} --effect {} -o {}";
+        refused(line, &[&model, &ramp, &effect, &out], told);
     };
     extend("plenum-drop", &["Did you mean `plenum-droop`?"]);
     extend("free-stream-variation", &["u_inf", "column"]);
@@ -483,13 +412,15 @@ fn bad_input_is_one_paragraph_and_leaves_no_file() {
         &text.replace("a = [0.9759", "a = [1.9759"),
     );
     refused(
-        &[p("compare"), &diverging, &data("paper-like")],
+        "compare {} {}",
+        &[&diverging, &data("paper-like")],
         &["diverges", "t ="],
     );
     let input = file("in.csv", "t,u\n0,0\n0.001,1\n0.002,x\n");
     let csv = folder.path().join("never.csv");
     refused(
-        &[p("simulate"), &model, &input, p("-o"), &csv],
+        "simulate {} {} -o {}",
+        &[&model, &input, &csv],
         &["in.csv", "line 4", "column `u`"],
     );
     assert!(!out.exists() && !csv.exists());
@@ -505,21 +436,14 @@ fn a_law_is_designed_for_a_model_with_an_effect_of_ones_own() {
     let (own, controlled) = (folder.path().join("own.toml"), folder.path().join("c.toml"));
     let ringing =
         Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/effects/supply-line-ringing.toml");
-    let mut model = Model::load(&data("paper/table-2-state-dependent.toml")).expect("the model");
+    let mut model = Model::load(&table_two()).expect("the model");
     model.convention = LagConvention::OneStep;
     let definition = Definition::load(&ringing).expect("the effect");
     model.define(definition).expect("a new name");
     model.add(definition.spec(), &[0.3, 10.0, 0.06], None);
     model.save(&own).expect("saved");
-    let asked = [
-        p("design"),
-        &own,
-        p("-o"),
-        &controlled,
-        p("--target"),
-        p("0.6"),
-    ];
-    let design = json(&[&asked[..], &QUICK_DESIGN.map(p)].concat());
+    let line = quick("design {} -o {} --target 0.6");
+    let design = json(&line, &[&own, &controlled]);
     let notes = design["not_tried"].to_string();
     assert!(notes.contains("without supply-line-ringing"), "{notes}");
     assert!(
@@ -537,7 +461,7 @@ fn a_law_is_designed_for_a_model_with_an_effect_of_ones_own() {
 /// Table II with one-step lags, saved into `folder`.
 fn paper_model(folder: &Path) -> PathBuf {
     let path = folder.join("m.toml");
-    let mut paper = Model::load(&data("paper/table-2-state-dependent.toml")).expect("the model");
+    let mut paper = Model::load(&table_two()).expect("the model");
     paper.convention = LagConvention::OneStep;
     paper.save(&path).expect("saved");
     path
@@ -551,49 +475,24 @@ fn stress_warns_and_refuses_nothing() {
     let path = |name: &str| folder.path().join(name);
     let (controlled, constants) = (path("c.toml"), path("c.rs"));
     let model = paper_model(folder.path());
-    let asked = [
-        p("design"),
-        &model,
-        p("-o"),
-        &controlled,
-        p("--target"),
-        p("0.5"),
-    ];
-    let output = run(&[&asked[..], &QUICK_DESIGN.map(p)].concat());
+    let line = quick("design {} -o {} --target 0.5");
+    let output = run(&line, &[&model, &controlled]);
     let said = String::from_utf8_lossy(&output.stdout);
     assert_eq!(output.status.code(), Some(0), "{said}");
-    for part in [
-        "warning: on plants that are not consistent with the records",
-        "LOST",
-        "Robustness margin",
-        "only the model was tried",
-    ] {
-        assert!(said.contains(part), "no `{part}` in: {said}");
-    }
+    contains_all(
+        &said,
+        &[
+            "warning: on plants that are not consistent with the records",
+            "LOST",
+            "Robustness margin",
+            "only the model was tried",
+        ],
+    );
     assert!(path("c-margin.svg").exists() && path("c-loop.svg").exists());
-    json(&[p("codegen"), &controlled, p("-o"), &constants]);
+    json("codegen {} -o {}", &[&controlled, &constants]);
     let text = std::fs::read_to_string(&constants).expect("constants");
     assert!(!text.contains("ATTACHMENT"), "{text}");
 }
-
-/// A first-order flow with a time constant of 0.2 s and a constant delay.
-const FIRST_ORDER: &str = r#"
-format_version = 1
-sample_period_s = 0.001
-lag_convention = "one-step"
-[structure]
-averaged = false
-window = 250
-state_lags = [1]
-product_lags = [1]
-[coefficients]
-a = [0.995]
-b = [0.005]
-c = [[0.0]]
-[delay]
-law = "fixed"
-delays = [40]
-"#;
 
 /// With a valve that stays closed for 0.6 s, attachment is lost on the model itself. No file is written and the
 /// targets that pass are listed; with `--force`, the file and the constants state the loss.
@@ -603,31 +502,31 @@ fn a_law_that_loses_its_own_model_is_refused_with_the_targets_that_pass() {
     let path = |name: &str| folder.path().join(name);
     let (controlled, constants) = (path("c.toml"), path("c.rs"));
     let model = path("m.toml");
-    std::fs::write(&model, FIRST_ORDER).expect("a file");
+    // A time constant of 0.2 s and a constant delay.
+    std::fs::write(&model, first_order(0.995, 0.005, FIXED_DELAY)).expect("a file");
     // Trials of half the length give the same decision, and three of nine other targets suffice.
-    let arguments = [
-        &[p("design"), &model, p("-o"), &controlled][..],
-        &[p("--target"), p("0.5"), p("--min-off"), p("0.6")],
-        &QUICK_DESIGN.map(p),
-    ]
-    .concat();
-    let with = |more: &[&'static str]| {
-        let more = more.iter().map(|text| p(text));
-        arguments.iter().copied().chain(more).collect::<Vec<_>>()
+    let line = |more: &str| {
+        quick(&format!(
+            "design {{}} -o {{}} --target 0.5 --min-off 0.6 {more}"
+        ))
     };
-    let output = run(&with(&["--set", "design.targets=4"]));
+    let output = run(&line("--set design.targets=4"), &[&model, &controlled]);
     let error = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(1), "{error}");
-    for part in ["the model itself", "Targets that pass: 0.", "--force"] {
-        assert!(error.contains(part), "no `{part}` in: {error}");
-    }
+    contains_all(
+        &error,
+        &["the model itself", "Targets that pass: 0.", "--force"],
+    );
     assert!(!controlled.exists());
-    let design = json(&with(&["--set", "design.targets=1", "--force"]));
+    let design = json(
+        &line("--set design.targets=1 --force"),
+        &[&model, &controlled],
+    );
     let lost = design["law"]["lost"].as_array().expect("trials");
     let written = Model::load(&controlled).expect("the model with its law");
     let named = written.law.expect("a law");
     assert!(!lost.is_empty() && named.lost().len() == lost.len());
-    json(&[p("codegen"), &controlled, p("-o"), &constants]);
+    json("codegen {} -o {}", &[&controlled, &constants]);
     let text = std::fs::read_to_string(&constants).expect("constants");
     assert!(text.contains("LOSES ATTACHMENT with the model itself"));
 }
@@ -661,17 +560,9 @@ fn a_law_is_asked_for_in_the_units_of_the_sensor() {
     }
     let (data, model, law) = (path("volts"), path("m.toml"), path("c.toml"));
     set.save(&data).expect("saved");
-    json(&[p("identify"), &data, p("-o"), &model]);
-    let asked = [
-        p("design"),
-        &model,
-        &data,
-        p("-o"),
-        &law,
-        p("--target"),
-        p("2.425"),
-    ];
-    let design = json(&[&asked[..], &QUICK_DESIGN.map(p)].concat());
+    json("identify {} -o {}", &[&data, &model]);
+    let line = quick("design {} {} -o {} --target 2.425");
+    let design = json(&line, &[&model, &data, &law]);
     let close = |value: &serde_json::Value, to: f64| {
         let value = value.as_f64().expect("a number");
         assert!((value - to).abs() < 0.002, "{value} is not {to}");
@@ -694,21 +585,16 @@ fn a_law_is_asked_for_in_the_units_of_the_sensor() {
         "{}",
         track.reference
     );
-    let output = run(&[
-        p("design"),
-        &model,
-        p("-o"),
-        &law,
-        p("--target"),
-        p("2.425"),
-        p("--min-on"),
-        p("5ms"),
-    ]);
+    let output = run(
+        "design {} -o {} --target 2.425 --min-on 5ms",
+        &[&model, &law],
+    );
     let error = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(1), "{error}");
-    for part in ["--min-on 0.005 s is too short", "0.033 s", "records"] {
-        assert!(error.contains(part), "no `{part}` in: {error}");
-    }
+    contains_all(
+        &error,
+        &["--min-on 0.005 s is too short", "0.033 s", "records"],
+    );
 }
 
 #[test]
@@ -717,18 +603,18 @@ fn files_of_other_programs_become_a_data_set() {
     let out = folder.path().join("set");
     let made = |name: &str| data("..").join("recordings/tests/import").join(name);
     let file = made("v7.mat");
-    let threshold = [p("--u-threshold"), p("2.5")];
-    let mut arguments = vec![p("import"), &file, p("-o"), &out];
-    arguments.extend(threshold);
-    let found = json(&arguments);
-    keys(&found, &["dataset", "hash", "sample_period_s", "files"]);
+    let found = json("import {} -o {} --u-threshold 2.5", &[&file, &out]);
+    keys(&found, "dataset hash sample_period_s files");
     assert_eq!(found["files"][0]["mapping"]["u"], "valve");
     let set = host_fit::data::DataSet::load(&out).expect("a data set");
     assert_eq!(found["hash"], set.hash);
     assert!(set.is_on_off());
     // The next run of the rig is imported like the first.
     let (next, other) = (made("german.csv"), folder.path().join("other"));
-    let like = [p("import"), &next, p("-o"), &other, p("--like"), &out];
-    refused(&like, &["german.csv", "no variable `valve`", "`Zeit` (40)"]);
+    refused(
+        "import {} -o {} --like {}",
+        &[&next, &other, &out],
+        &["german.csv", "no variable `valve`", "`Zeit` (40)"],
+    );
     assert!(!other.exists(), "nothing half-written");
 }

@@ -9,29 +9,15 @@ use host_fit::model::Model;
 use host_fit::steps::discover;
 use scenarios::campaign::terms::Row;
 use scenarios::campaign::{Case, Group, Part};
+use scenarios::first_order;
 
-/// A rough guess, like a model made by hand.
-const GUESS: &str = r#"
-format_version = 1
-sample_period_s = 0.001
-lag_convention = "one-step"
-[structure]
-averaged = false
-window = 250
-state_lags = [1]
-product_lags = [1]
-[coefficients]
-a = [0.98]
-b = [0.02]
-c = [[0.0]]
-[delay]
-law = "state-dependent"
+const DELAY: &str = "law = \"state-dependent\"
 delay_floor = 35.0
 delay_rise = 10.0
 delay_rate = 6.0
 factors = [1.0]
-interpolated = true
-"#;
+\
+     interpolated = true";
 
 fn asked(group: Group, family: Family, hidden: &[&str], seed: u64) -> Row {
     let case = Case::new(group, family, hidden, seed);
@@ -39,7 +25,7 @@ fn asked(group: Group, family: Family, hidden: &[&str], seed: u64) -> Row {
     let set = plan.build().expect("records").data;
     let records = Part::THIRD.of(&set);
     let set = DataSet::from_records(set.title, records).expect("a data set");
-    let guess = Model::from_toml(GUESS, "guess.toml").expect("a model");
+    let guess = Model::from_toml(&first_order(0.98, 0.02, DELAY), "guess.toml").expect("a model");
     let options = Options {
         terms: 1,
         ..Options::default()

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
-use scenarios::program;
+use scenarios::{Parts, host_fit, program};
 use tempfile::TempDir;
 
 const MODEL: &str = include_str!("../data/hostile/model.toml");
@@ -43,9 +43,8 @@ impl Room {
 
 /// Runs the program with a limit of half a minute.
 #[track_caller]
-fn run(arguments: &[&str]) -> Output {
-    let mut child = Command::new(program())
-        .args(arguments)
+fn run(line: &str, parts: Parts<'_>) -> Output {
+    let mut child = host_fit(line, parts)
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()
@@ -54,7 +53,7 @@ fn run(arguments: &[&str]) -> Output {
     while child.try_wait().expect("a child").is_none() {
         if Instant::now() > until {
             child.kill().expect("ended");
-            panic!("no end: {arguments:?}");
+            panic!("no end: {line}");
         }
         std::thread::sleep(Duration::from_millis(5));
     }
@@ -63,26 +62,25 @@ fn run(arguments: &[&str]) -> Output {
 
 /// Exit 1 and one paragraph with every part, of visible characters.
 #[track_caller]
-fn refused(arguments: &[&str], parts: &[&str]) -> String {
-    let output = run(arguments);
+fn refused(line: &str, parts: Parts<'_>, told: &[&str]) {
+    let output = run(line, parts);
     let error = String::from_utf8(output.stderr).expect("UTF-8");
-    assert_eq!(output.status.code(), Some(1), "{arguments:?}: {error}");
-    let line = error.strip_suffix('\n').unwrap_or(&error);
+    assert_eq!(output.status.code(), Some(1), "{line}: {error}");
+    let paragraph = error.strip_suffix('\n').unwrap_or(&error);
     assert!(
-        line.starts_with("error: ") && !line.chars().any(char::is_control),
+        paragraph.starts_with("error: ") && !paragraph.chars().any(char::is_control),
         "{error:?}"
     );
-    for part in parts {
+    for part in told {
         assert!(error.contains(part), "no `{part}` in: {error}");
     }
-    error
 }
 
 #[track_caller]
-fn done(arguments: &[&str]) -> Output {
-    let output = run(arguments);
+fn done(line: &str, parts: Parts<'_>) -> Output {
+    let output = run(line, parts);
     let error = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(0), "{arguments:?}: {error}");
+    assert_eq!(output.status.code(), Some(0), "{line}: {error}");
     output
 }
 
@@ -102,10 +100,15 @@ fn values_of_a_model_are_checked_when_it_is_loaded() {
         ("[0.0, 0.84]", "[-inf, inf]", "law.reachable"),
     ] {
         let model = room.file("m.toml", &MODEL.replacen(from, to, 1));
-        refused(&["simulate", &model, &step, "-o", &out], &["m.toml", key]);
-        refused(&["codegen", &model, "-o", &out], &["m.toml", key]);
         refused(
-            &["design", &model, "-o", &out, "--target", "0.5"],
+            "simulate {} {} -o {}",
+            &[&model, &step, &out],
+            &["m.toml", key],
+        );
+        refused("codegen {} -o {}", &[&model, &out], &["m.toml", key]);
+        refused(
+            "design {} -o {} --target 0.5",
+            &[&model, &out],
             &["m.toml", key],
         );
     }
@@ -120,7 +123,7 @@ fn no_design_goes_on_for_ever() {
     let lags = ["state_lags = [65535]", "product_lags = [3000]"];
     for (lag, from) in lags.iter().zip(["state_lags = [1]", "product_lags = [1]"]) {
         let model = room.file("m.toml", &MODEL.replacen(from, lag, 1));
-        let output = run(&["design", &model, "-o", &out, "--target", "0.02"]);
+        let output = run("design {} -o {} --target 0.02", &[&model, &out]);
         let error = String::from_utf8_lossy(&output.stderr);
         assert!(
             matches!(output.status.code(), Some(0 | 1)) && !error.contains("panicked"),
@@ -128,13 +131,13 @@ fn no_design_goes_on_for_ever() {
         );
     }
     let model = room.file("m.toml", MODEL);
-    let maximise = ["design", &model, "-o", &out, "--goal", "maximise"];
     for (option, value) in [
         ("--horizon", "1e300"),
         ("--horizon", "4294967295samples"),
         ("--min-on", "1e300"),
     ] {
-        refused(&[&maximise[..], &[option, value]].concat(), &["100 s"]);
+        let line = "design {} -o {} --goal maximise {} {}";
+        refused(line, &[&model, &out, &option, &value], &["100 s"]);
     }
 }
 
@@ -151,26 +154,15 @@ fn memory_is_counted_before_it_is_asked_for() {
         )
     });
     let (long, out) = (room.file("long.csv", &rows), room.named("m.toml"));
-    let identify = [
-        "identify",
-        &long,
-        "-o",
-        &out,
-        "--n1",
-        "1",
-        "--n2",
-        "1",
-        "--n3",
-        "1",
-        "--evaluations",
-        "2",
-    ];
+    let identify = "identify {} -o {} --n1 1 --n2 1 --n3 1 --evaluations 2";
     refused(
-        &[&identify[..], &["--max-lag", "12000"]].concat(),
+        &format!("{identify} --max-lag 12000"),
+        &[&long, &out],
         &["--max-lag", "GB", "--memory"],
     );
     refused(
-        &[&identify[..], &["--max-lag", "3000", "--memory", "0.2"]].concat(),
+        &format!("{identify} --max-lag 3000 --memory 0.2"),
+        &[&long, &out],
         &["0.2 GB", "--memory"],
     );
     // Ten million cells in a file of ten lines.
@@ -181,10 +173,11 @@ fn memory_is_counted_before_it_is_asked_for() {
         &format!("{wide}\n0,0,1{row}\n1,1,1{row}\n2,0,1{row}\n"),
     );
     refused(
-        &["import", &wide, "-o", &room.named("set")],
+        "import {} -o {}",
+        &[&wide, &room.named("set")],
         &["wide.csv", "16384"],
     );
-    assert_eq!(run(&["effects", "--memory", "0"]).status.code(), Some(2));
+    assert_eq!(run("effects --memory 0", &[]).status.code(), Some(2));
 }
 
 /// The output of one command is readable by the next.
@@ -192,37 +185,29 @@ fn memory_is_counted_before_it_is_asked_for() {
 fn what_is_written_can_be_read() {
     let room = Room::new();
     let (set, model) = (data("hidden-ramp"), room.named("m.toml"));
-    let identify = [
-        "identify",
-        &set,
-        "-o",
-        &model,
-        "--n1",
-        "1",
-        "--n2",
-        "1",
-        "--n3",
-        "1",
-        "--evaluations",
-        "50",
-    ];
+    let identify = "identify {} -o {} --n1 1 --n2 1 --n3 1 --evaluations 50 --seed {}";
     for seed in ["9223372036854775808", "18446744073709551615"] {
-        done(&[&identify[..], &["--seed", seed]].concat());
-        done(&["compare", &model, &set]);
+        done(identify, &[&set, &model, &seed]);
+        done("compare {} {}", &[&model, &set]);
     }
     let tiny = room.file(
         "tiny.csv",
         "t,u,y\n0,0,1e-320\n1e-320,0,1e-320\n2e-320,1,0\n",
     );
     refused(
-        &["import", &tiny, "-o", &room.named("out")],
+        "import {} -o {}",
+        &[&tiny, &room.named("out")],
         &["tiny.csv", "sampling period"],
     );
     let late = room.file(
         "late.csv",
         "t,u,y\n1700000000.0000001,0,1\n1700000000.0000002,0,1\n1700000000.0000003,1,0\n",
     );
-    refused(&["import", &late, "-o", &room.named("out")], &["late.csv"]);
+    refused(
+        "import {} -o {}",
+        &[&late, &room.named("out")],
+        &["late.csv"],
+    );
 }
 
 /// Names that control a terminal are escaped in messages, documents and generated code; a path may contain any
@@ -232,7 +217,11 @@ fn names_are_shown_and_do_not_act() {
     let room = Room::new();
     let acting = "a\\u001b[2J\\u001b]0;x\\u0007b\\u202Ec\\rd";
     let model = room.file("m.toml", &MODEL.replacen("plenum-droop", acting, 1));
-    refused(&["compare", &model, &data("hidden-ramp")], &["a\\u{1b}[2J"]);
+    refused(
+        "compare {} {}",
+        &[&model, &data("hidden-ramp")],
+        &["a\\u{1b}[2J"],
+    );
     let model = room.file(
         "m.toml",
         &MODEL.replacen(
@@ -242,7 +231,7 @@ fn names_are_shown_and_do_not_act() {
         ),
     );
     let out = room.named("o.rs");
-    let told = done(&["codegen", &model, "-o", &out, "--json"]);
+    let told = done("codegen {} -o {} --json", &[&model, &out]);
     let written = fs::read_to_string(&out).expect("written");
     for text in [String::from_utf8(told.stdout).expect("UTF-8"), written] {
         let acts = |c: char| (c.is_control() && c != '\n') || c == '\u{202e}';
@@ -278,43 +267,42 @@ fn names_are_shown_and_do_not_act() {
 /// that nothing was read before.
 #[test]
 fn an_output_that_cannot_be_written_is_refused_before_anything_is_read() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let path = |name: &str| folder.path().join(name).to_string_lossy().into_owned();
-    let (model, data, nowhere) = (path("m.toml"), path("data"), path("none/out"));
-    let own = ["--effect", "plenum-droop"];
-    for (command, inputs, outputs) in [
-        ("identify", &[&data][..], &["-o", "--report"][..]),
+    let room = Room::new();
+    let (model, data) = (room.named("m.toml"), room.named("data"));
+    let (kept, nowhere) = (room.named("kept.toml"), room.named("none/out"));
+    let cases: [(&str, Parts<'_>, &[&str]); 5] = [
+        ("identify {}", &[&data], &["-o", "--report"]),
         (
-            "diagnose",
+            "diagnose {} {}",
             &[&model, &data],
             &["-o", "--report", "--experiment"],
         ),
-        ("discover", &[&model, &data], &["-o", "--report", "--trace"]),
-        ("extend", &[&model, &data], &["-o"]),
-        ("design", &[&model], &["-o", "--csv"]),
-    ] {
+        (
+            "discover {} {}",
+            &[&model, &data],
+            &["-o", "--report", "--trace"],
+        ),
+        (
+            "extend {} {} --effect plenum-droop",
+            &[&model, &data],
+            &["-o"],
+        ),
+        ("design {} --target 0.5", &[&model], &["-o", "--csv"]),
+    ];
+    for (line, inputs, outputs) in cases {
         for option in outputs {
-            let mut program = std::process::Command::new(scenarios::program());
-            program
-                .arg(command)
-                .args(inputs)
-                .args([option, &nowhere.as_str()]);
-            if command == "extend" {
-                program.args(own);
+            let mut command = host_fit(line, inputs);
+            command.args([option, &nowhere.as_str()]);
+            if *option != "-o" && (line.starts_with("identify") || line.starts_with("design")) {
+                command.args(["-o", &kept]);
             }
-            if command == "design" {
-                program.args(["--target", "0.5"]);
-            }
-            if *option != "-o" && matches!(command, "identify" | "design") {
-                program.args(["-o", &path("kept.toml")]);
-            }
-            let output = program.output().expect("it runs");
+            let output = command.output().expect("it runs");
             let error = String::from_utf8_lossy(&output.stderr);
             assert!(
                 error.contains("none/out cannot be written"),
-                "{command} {option}: {error}"
+                "{line} {option}: {error}"
             );
-            assert_eq!(output.status.code(), Some(1), "{command} {option}");
+            assert_eq!(output.status.code(), Some(1), "{line} {option}");
         }
     }
 }
@@ -334,13 +322,14 @@ fn a_rig_that_single_precision_cannot_hold_is_refused() {
     ] {
         let rig = room.file("rig.toml", &rig.replacen(from, to, 1));
         refused(
-            &["codegen", &model, "--rig", &rig, "-o", &out],
+            "codegen {} --rig {} -o {}",
+            &[&model, &rig, &out],
             &["rig.toml", key],
         );
     }
     assert!(!room.path("rig.rs").exists());
     let rig = room.file("rig.toml", rig);
-    done(&["codegen", &model, "--rig", &rig, "-o", &out]);
+    done("codegen {} --rig {} -o {}", &[&model, &rig, &out]);
 }
 
 /// The unit of y must not matter: a model that is unstable at 1 is also unstable at 1e-30 and at 1e12, and a stable
@@ -359,20 +348,10 @@ fn stability_does_not_depend_on_the_unit() {
             text.push_str(&format!("{},{},{:e}\n", cells[0], cells[1], value * scale));
         }
         let (file, model) = (room.file("run.csv", &text), room.named("m.toml"));
-        done(&[
-            "identify",
-            &file,
-            "-o",
-            &model,
-            "--n1",
-            "1",
-            "--n2",
-            "1",
-            "--n3",
-            "1",
-            "--evaluations",
-            "100",
-        ]);
+        done(
+            "identify {} -o {} --n1 1 --n2 1 --n3 1 --evaluations 100",
+            &[&file, &model],
+        );
         let command = room.file(
             "u.csv",
             &text
@@ -383,7 +362,10 @@ fn stability_does_not_depend_on_the_unit() {
                 })
                 .collect::<String>(),
         );
-        done(&["simulate", &model, &command, "-o", &room.named("o.csv")]);
+        done(
+            "simulate {} {} -o {}",
+            &[&model, &command, &room.named("o.csv")],
+        );
     }
 }
 
@@ -397,23 +379,20 @@ fn ctrl_c_ends_every_command() {
         room.named("out.toml"),
         room.file("m.toml", MODEL),
     );
-    let commands: [&[&str]; 5] = [
-        &["identify", &set, "-o", &out],
-        &["diagnose", &model, &set],
-        &["discover", &model, &set],
-        &["extend", &model, &set, "--effect", "valve-lag", "-o", &out],
-        &[
-            "design",
-            &model,
-            "--goal",
-            "maximise",
-            "--horizon",
-            "50",
-            "-o",
-            &out,
-        ],
+    let commands: [(&str, Parts<'_>); 5] = [
+        ("identify {} -o {}", &[&set, &out]),
+        ("diagnose {} {}", &[&model, &set]),
+        ("discover {} {}", &[&model, &set]),
+        (
+            "extend {} {} --effect valve-lag -o {}",
+            &[&model, &set, &out],
+        ),
+        (
+            "design {} --goal maximise --horizon 50 -o {}",
+            &[&model, &out],
+        ),
     ];
-    for command in commands {
+    for (command, parts) in commands {
         for after in [0.1, 1.0] {
             let said = fs::File::create(room.path("said.json")).expect("a file");
             // After a `&` of a shell the signal is ignored until the program requests it, and a signal before that
@@ -421,7 +400,7 @@ fn ctrl_c_ends_every_command() {
             let child = Command::new("env")
                 .arg("--default-signal=INT")
                 .arg(program())
-                .args(command)
+                .args(host_fit(command, parts).get_args())
                 .arg("--json")
                 .stdout(said)
                 .stderr(Stdio::null())
@@ -438,14 +417,14 @@ fn ctrl_c_ends_every_command() {
             while child.try_wait().expect("a child").is_none() {
                 if asked.elapsed() > Duration::from_secs(40) {
                     child.kill().expect("ended");
-                    panic!("{command:?} goes on after {after} s");
+                    panic!("{command} goes on after {after} s");
                 }
                 std::thread::sleep(Duration::from_millis(10));
             }
             // The result so far may be returned; a message then says so.
             if works && child.wait().expect("a child").success() {
                 let said = fs::read_to_string(room.path("said.json")).expect("an answer");
-                assert!(said.contains("interrupted"), "{command:?} after {after} s");
+                assert!(said.contains("interrupted"), "{command} after {after} s");
             }
             let names = fs::read_dir(room.0.path()).expect("a folder").flatten();
             let names: Vec<String> = names

@@ -3,32 +3,27 @@
 use std::path::Path;
 use std::process::{Command, Output};
 
-use scenarios::program;
+use scenarios::host_fit;
 use serde_json::Value;
 
-/// Runs `identify` on a bundled set; the model goes to `model`.
-fn identify(set: &str, model: &Path, options: &[&str]) -> Output {
-    let data = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../data")
-        .join(set);
-    Command::new(program())
-        .args(["--json", "identify"])
-        .arg(data)
-        .arg("-o")
-        .arg(model)
-        .args(options)
-        .output()
-        .expect("the program starts")
+/// `identify` on a bundled set; the model goes to `model`.
+fn identify(set: &str, model: &Path, options: &str) -> Command {
+    let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("../data");
+    host_fit(
+        &format!("--json identify {{}} -o {{}} {options}"),
+        &[&data.join(set), &model],
+    )
 }
 
 /// The document and the model of a run that succeeds.
 #[track_caller]
-fn found(set: &str, options: &[&str]) -> (Value, String) {
+fn found(set: &str, options: &str) -> (Value, String) {
     let folder = tempfile::tempdir().expect("a folder");
     let model = folder.path().join("model.toml");
-    let output = identify(set, &model, options);
+    let output = identify(set, &model, options).output();
+    let output = output.expect("the program starts");
     let error = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(0), "{options:?}: {error}");
+    assert_eq!(output.status.code(), Some(0), "{options}: {error}");
     let document = serde_json::from_slice(&output.stdout).expect("one JSON document");
     (
         document,
@@ -37,24 +32,13 @@ fn found(set: &str, options: &[&str]) -> (Value, String) {
 }
 
 /// A search small enough for a test.
-const SMALL: [&str; 8] = [
-    "--n1",
-    "2",
-    "--n2",
-    "2",
-    "--max-lag",
-    "60",
-    "--objective",
-    "one-step",
-];
-
-fn small<'a>(more: &[&'a str]) -> Vec<&'a str> {
-    SMALL.into_iter().chain(more.iter().copied()).collect()
+fn small(objective: &str, more: &str) -> String {
+    format!("--n1 2 --n2 2 --max-lag 60 --objective {objective} {more}")
 }
 
 #[test]
 fn the_document_has_the_keys_that_scripts_rely_on() {
-    let (document, _) = found("ramp-cfd", &small(&[]));
+    let (document, _) = found("ramp-cfd", &small("one-step", ""));
     for key in [
         "model",
         "objective",
@@ -85,10 +69,7 @@ fn the_document_has_the_keys_that_scripts_rely_on() {
         assert!(document["delays"][key].is_array(), "{key}");
     }
     // The bundled square waves repeat every 250 samples, which the longest lag reaches.
-    let (document, _) = found(
-        "ramp-cfd",
-        &["--evaluations", "50", "--objective", "one-step"],
-    );
+    let (document, _) = found("ramp-cfd", "--evaluations 50 --objective one-step");
     let warnings = document["excitation"].as_array().expect("a list");
     assert!(
         warnings
@@ -101,11 +82,8 @@ fn the_document_has_the_keys_that_scripts_rely_on() {
 #[test]
 fn a_seed_repeats_bit_for_bit_with_any_number_of_threads() {
     for objective in ["one-step", "free-run"] {
-        let run = |more: &[&str]| {
-            let mut options = small(&["--objective", objective, "--evaluations", "400"]);
-            // The last `--objective` would be refused as a duplicate.
-            options.drain(6..8);
-            options.extend(more);
+        let run = |more: &str| {
+            let options = small(objective, &format!("--evaluations 400 {more}"));
             let (mut document, model) = found("ramp-cfd", &options);
             for changing in ["wall_time_s", "model"] {
                 document[changing] = Value::Null;
@@ -114,26 +92,25 @@ fn a_seed_repeats_bit_for_bit_with_any_number_of_threads() {
             document["answer"]["next"] = Value::Null;
             (document.to_string(), model)
         };
-        let first = run(&["--seed", "3"]);
-        assert_eq!(first, run(&["--seed", "3"]), "{objective}");
-        assert_eq!(
-            first,
-            run(&["--seed", "3", "--threads", "2"]),
-            "{objective}"
-        );
+        let first = run("--seed 3");
+        assert_eq!(first, run("--seed 3"), "{objective}");
+        assert_eq!(first, run("--seed 3 --threads 2"), "{objective}");
     }
 }
 
 #[test]
 fn every_kind_of_model_is_identified() {
-    let (document, model) = found("ramp-cfd", &small(&["--averaged"]));
+    let (document, model) = found("ramp-cfd", &small("one-step", "--averaged"));
     assert!(model.contains("averaged = true"));
     assert_eq!(
         document["delays"]["input"].as_array().map(Vec::len),
         Some(2)
     );
 
-    let (document, model) = found("ramp-cfd", &small(&["--effect", "amplitude-saturation"]));
+    let (document, model) = found(
+        "ramp-cfd",
+        &small("one-step", "--effect amplitude-saturation"),
+    );
     assert!(model.contains("amplitude-saturation"));
     assert!(
         document["identify"]["fit_percent"]
@@ -144,7 +121,7 @@ fn every_kind_of_model_is_identified() {
 
     let (document, model) = found(
         "ramp-cfd",
-        &small(&["--delay-law", "9,2,10", "--factors", "1"]),
+        &small("one-step", "--delay-law 9,2,10 --factors 1"),
     );
     assert!(model.contains("one-step"));
     assert_eq!(document["delays"]["factors"], serde_json::json!([1.0]));
@@ -153,7 +130,7 @@ fn every_kind_of_model_is_identified() {
         serde_json::json!([9.0, 2.0, 10.0])
     );
 
-    let (document, _) = found("ramp-cfd", &small(&["--delay", "fixed"]));
+    let (document, _) = found("ramp-cfd", &small("one-step", "--delay fixed"));
     assert_eq!(
         document["delays"]["input"].as_array().map(Vec::len),
         Some(1)
@@ -164,18 +141,8 @@ fn every_kind_of_model_is_identified() {
 /// The averaged model is refined on the averages that it describes.
 #[test]
 fn averaged_models_are_refined_on_their_free_run() {
-    let options = [
-        "--averaged",
-        "--n3",
-        "1",
-        "--max-lag",
-        "30",
-        "--objective",
-        "free-run",
-        "--evaluations",
-        "300",
-    ];
-    let (document, _) = found("ramp-cfd", &options);
+    let options = "--averaged --n3 1 --max-lag 30 --objective free-run --evaluations 300";
+    let (document, _) = found("ramp-cfd", options);
     let epsilon = &document["refinement"]["identify_epsilon"];
     let (before, after) = (epsilon[0].as_f64(), epsilon[1].as_f64());
     let before = before.expect("a number");
@@ -191,10 +158,9 @@ fn averaged_models_are_refined_on_their_free_run() {
 /// delay.
 #[test]
 fn the_validation_error_decides_between_a_law_and_a_constant_delay() {
-    let sizes = ["--n1", "2", "--n2", "2", "--max-lag", "150"];
     let fit = |set: &str, delay: &str| {
-        let options = ["--evaluations", "600", "--delay", delay];
-        let (document, model) = found(set, &[&sizes[..], &options].concat());
+        let options = format!("--n1 2 --n2 2 --max-lag 150 --evaluations 600 --delay {delay}");
+        let (document, model) = found(set, &options);
         let fit = document["validate"]["fit_percent"].as_f64();
         (
             fit.expect("validation records"),
@@ -214,8 +180,9 @@ fn the_validation_error_decides_between_a_law_and_a_constant_delay() {
 fn factors_need_a_law() {
     let folder = tempfile::tempdir().expect("a folder");
     let model = folder.path().join("model.toml");
-    for options in [["--factors", "1"], ["--factors=-1", "--delay-law=9,2,10"]] {
-        let output = identify("ramp-cfd", &model, &options);
+    for options in ["--factors 1", "--factors=-1 --delay-law=9,2,10"] {
+        let output = identify("ramp-cfd", &model, options).output();
+        let output = output.expect("the program starts");
         let error = String::from_utf8_lossy(&output.stderr);
         assert_eq!(output.status.code(), Some(1), "{error}");
         assert!(error.contains("--factors"), "{error}");
@@ -242,13 +209,8 @@ fn an_interrupt_keeps_the_best_so_far() {
 /// A search that is interrupted after that time.
 #[cfg(unix)]
 fn interrupted_after(seconds: f64, model: &Path) -> Output {
-    let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("../data/paper-like");
-    let process = Command::new(program())
-        // Ten lags take minutes.
-        .args(["--json", "identify", "--n1", "5"])
-        .arg(data)
-        .arg("-o")
-        .arg(model)
+    // Ten lags take minutes.
+    let process = identify("paper-like", model, "--n1 5")
         .stdout(std::process::Stdio::piped())
         .spawn()
         .expect("the program starts");

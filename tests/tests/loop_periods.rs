@@ -1,12 +1,12 @@
 //! A law at any loop period: designed, its constants written; invalid periods are refused first.
 
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Output;
 
 use host_fit::model::{Law, Model};
 use host_fit::terms::Units;
 use model_core::recursion::LagConvention;
-use scenarios::{QUICK_DESIGN, program};
+use scenarios::{Parts, QUICK_DESIGN, host_fit};
 
 /// The paper's flow on a rig that is slower by the ratio of the period to 1 ms.
 fn paper_at(period_s: f64) -> Model {
@@ -26,11 +26,8 @@ fn paper_at(period_s: f64) -> Model {
     }
 }
 
-fn run(arguments: &[&str]) -> Output {
-    Command::new(program())
-        .args(arguments)
-        .output()
-        .expect("the program starts")
+fn run(line: &str, parts: Parts<'_>) -> Output {
+    host_fit(line, parts).output().expect("the program starts")
 }
 
 fn error_of(output: &Output) -> String {
@@ -45,21 +42,8 @@ fn a_slower_rig_gets_the_same_law_and_constants_with_its_period() {
         let name = |suffix: &str| folder.path().join(suffix).to_string_lossy().into_owned();
         let [model, controlled, constants] = [name("m.toml"), name("c.toml"), name("c.rs")];
         paper_at(period_s).save(Path::new(&model)).expect("saved");
-        let mut arguments = vec![
-            "--json",
-            "design",
-            &model,
-            "-o",
-            &controlled,
-            "--target",
-            "0.8",
-            "--min-on",
-            "12samples",
-            "--min-off",
-            "12samples",
-        ];
-        arguments.extend(QUICK_DESIGN);
-        let output = run(&arguments);
+        let line = "--json design {} -o {} --target 0.8 --min-on 12samples --min-off 12samples";
+        let output = run(&format!("{line} {QUICK_DESIGN}"), &[&model, &controlled]);
         assert_eq!(output.status.code(), Some(0), "{}", error_of(&output));
         let json: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
         assert_eq!(json["sample_period_s"].as_f64(), Some(period_s));
@@ -68,7 +52,7 @@ fn a_slower_rig_gets_the_same_law_and_constants_with_its_period() {
             panic!("{law:?}");
         };
         laws.push(law);
-        let output = run(&["codegen", &controlled, "--board", "-o", &constants]);
+        let output = run("codegen {} --board -o {}", &[&controlled, &constants]);
         assert_eq!(output.status.code(), Some(0), "{}", error_of(&output));
         let text = std::fs::read_to_string(&constants).expect("constants");
         let line = format!("pub const SAMPLE_PERIOD_S: f32 = {period_s};");
@@ -100,16 +84,10 @@ fn what_is_no_loops_period_is_refused_before_anything_else() {
     for period_s in [0.0001, 0.25, 60.0] {
         paper_at(period_s).save(Path::new(&model)).expect("saved");
         // The target, which cannot be held, and the rig file, which does not exist, are not checked before.
-        let output = run(&[
-            "design",
-            &model,
-            "-o",
-            &out,
-            "--target",
-            "7",
-            "--rig",
-            "none.toml",
-        ]);
+        let output = run(
+            "design {} -o {} --target 7 --rig none.toml",
+            &[&model, &out],
+        );
         let error = error_of(&output);
         assert_eq!(output.status.code(), Some(1), "{error}");
         for part in ["m.toml", "`sample_period_s`", "0.2 to 100 ms", "identify"] {
@@ -118,9 +96,10 @@ fn what_is_no_loops_period_is_refused_before_anything_else() {
     }
     paper_at(0.1).save(Path::new(&model)).expect("saved");
     let at = |option: &str, value: &str| {
-        let output = run(&[
-            "design", &model, "-o", &out, "--target", "0.8", option, value,
-        ]);
+        let output = run(
+            "design {} -o {} --target 0.8 {} {}",
+            &[&model, &out, &option, &value],
+        );
         (output.status.code(), error_of(&output))
     };
     for option in ["--min-on", "--min-off"] {

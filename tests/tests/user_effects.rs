@@ -7,6 +7,7 @@ use host_fit::model::Model;
 use host_fit::user_effect::Definition;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use scenarios::{FIXED_DELAY, first_order};
 use std::sync::atomic::AtomicBool;
 
 const PERIOD: f64 = 0.001;
@@ -85,25 +86,6 @@ impl Rig {
     }
 }
 
-/// A rough guess, like a model made by hand.
-const GUESS: &str = r#"
-format_version = 1
-sample_period_s = 0.001
-lag_convention = "one-step"
-[structure]
-averaged = false
-window = 250
-state_lags = [1]
-product_lags = [1]
-[coefficients]
-a = [0.98]
-b = [0.02]
-c = [[0.0]]
-[delay]
-law = "fixed"
-delays = [40]
-"#;
-
 fn diagnosis(rig: &Rig, guess: &str, definitions: &[&str]) -> Diagnosis {
     let mut model = Model::from_toml(guess, "guess.toml").expect("a model");
     for text in definitions {
@@ -170,7 +152,7 @@ fn a_ringing_supply_line_is_found_when_it_is_offered() {
     // A fixed delay is a whole number of samples and stays at the base model's value; a delay law is refitted with
     // the effect.
     let law = "law = \"state-dependent\"\ndelay_floor = 40.0\ndelay_rise = 1.0\ndelay_rate = 4.0\nfactors = [1.0]\ninterpolated = true";
-    let guess = GUESS.replace("law = \"fixed\"\ndelays = [40]", law);
+    let guess = first_order(0.98, 0.02, law);
     let found = diagnosis(&rig, &guess, &[RINGING]);
     // The gain depends on the flow's response to jets of part strength, which these records do not identify.
     let truth = [("frequency", 22.0), ("decay_time", 0.08)];
@@ -184,7 +166,7 @@ fn a_film_that_feels_the_temperature_is_found_when_it_is_offered() {
         air: |time| 20.0 + 3.0 * (1.7 * time).sin() + 2.0 * (4.1 * time).sin(),
         reading: |friction, film| friction * (1.0 - 0.04 * (film - 20.0)),
     };
-    let found = diagnosis(&rig, GUESS, &[WARM_FILM]);
+    let found = diagnosis(&rig, &first_order(0.98, 0.02, FIXED_DELAY), &[WARM_FILM]);
     let truth = [("sensitivity", 0.04), ("warming_time", 0.5)];
     assert_found(&found, "warm-film", &truth);
 }

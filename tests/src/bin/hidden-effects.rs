@@ -1,7 +1,5 @@
 //! Runs the hidden-effects campaign and prints its tables as Markdown.
 
-use std::process::ExitCode;
-
 use clap::Parser;
 use scenarios::campaign::{Case, Given, Group, Ledger, Row, Sizes, calibration, cases, run, table};
 
@@ -61,17 +59,8 @@ fn group(word: &str) -> Result<Group, String> {
     })
 }
 
-fn main() -> ExitCode {
-    match campaign(&Arguments::parse()) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("hidden-effects: {error:#}");
-            ExitCode::FAILURE
-        }
-    }
-}
-
-fn campaign(arguments: &Arguments) -> anyhow::Result<()> {
+fn main() -> anyhow::Result<()> {
+    let arguments = Arguments::parse();
     let sizes = Sizes {
         draws: arguments.draws,
         altered: arguments.altered,

@@ -1,7 +1,5 @@
 //! Runs the hidden-terms campaign and prints its tables as Markdown.
 
-use std::process::ExitCode;
-
 use clap::Parser;
 use scenarios::campaign::terms::{Row, Sizes, cases, run, table};
 use scenarios::campaign::{Case, Group, Ledger};
@@ -39,17 +37,8 @@ fn group(word: &str) -> Result<Group, String> {
     found.ok_or_else(|| "one of beyond, single, nothing is needed".to_owned())
 }
 
-fn main() -> ExitCode {
-    match campaign(&Arguments::parse()) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("hidden-terms: {error:#}");
-            ExitCode::FAILURE
-        }
-    }
-}
-
-fn campaign(arguments: &Arguments) -> anyhow::Result<()> {
+fn main() -> anyhow::Result<()> {
+    let arguments = Arguments::parse();
     let sizes = Sizes {
         draws: arguments.draws,
         without: arguments.without,

@@ -1,7 +1,5 @@
 //! Runs the campaign on published flows and prints its table as Markdown.
 
-use std::process::ExitCode;
-
 use clap::Parser;
 use scenarios::campaign::Ledger;
 use scenarios::campaign::literature::{Row, cases, run, table};
@@ -23,18 +21,12 @@ struct Arguments {
     ideal_instruments: bool,
 }
 
-fn main() -> ExitCode {
+fn main() -> anyhow::Result<()> {
     let arguments = Arguments::parse();
     let real = !arguments.ideal_instruments;
     let wanted = cases(arguments.cases, real, arguments.ledger.seed);
     let told = |rows: &[Row]| table(rows);
-    match (arguments.ledger).keep("literature", wanted, run, tell, told) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("literature: {error:#}");
-            ExitCode::FAILURE
-        }
-    }
+    (arguments.ledger).keep("literature", wanted, run, tell, told)
 }
 
 /// A progress line.

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use super::case::Group;
-use super::counts::bounded;
+use super::counts::{bounded, grouped, those};
 use super::row::{Found, Row};
 
 /// The page, from the rows of the campaign with this seed.
@@ -43,9 +43,7 @@ pub fn calibration(seed: u64, rows: &[Row]) -> String {
         ("exact equations", &exact, "≥ 97 %", "≤ 1 %"),
         ("altered equations", &altered, "≥ 95 %", "≤ 5 %"),
     ] {
-        let named: Vec<&Row> = (rows.iter().copied())
-            .filter(|row| !row.missing.is_empty())
-            .collect();
+        let named = those(rows, |row| !row.missing.is_empty());
         line(
             &format!(
                 "the true effect is in a stated equivalence set, where an effect is named, {what}"
@@ -81,13 +79,10 @@ pub fn calibration(seed: u64, rows: &[Row]) -> String {
         "≤ 5 % of runs",
     );
     let put_in = of(Group::Power);
-    let seen: Vec<&Row> = (put_in.iter().copied())
-        .filter(|row| {
-            row.put_in
-                .as_ref()
-                .is_some_and(|put_in| put_in.amplitude.is_some())
-        })
-        .collect();
+    let seen = those(&put_in, |row| {
+        let put_in = row.put_in.as_ref();
+        put_in.is_some_and(|put_in| put_in.amplitude.is_some())
+    });
     line(
         "effects of the size stated as detectable with 80 % power: named",
         share(&seen, Row::is_found),
@@ -121,11 +116,7 @@ pub fn calibration(seed: u64, rows: &[Row]) -> String {
     }
     if !seen.is_empty() {
         text += "\n## Effects of the size stated as detectable\n\n| effect | named | otherwise reported |\n|---|---|---|\n";
-        let mut effects: BTreeMap<&str, Vec<&Row>> = BTreeMap::new();
-        for row in &seen {
-            effects.entry(&row.label).or_default().push(row);
-        }
-        for (effect, rows) in &effects {
+        for (effect, rows) in &grouped(&seen, |row| &row.label) {
             let named = rows.iter().filter(|row| row.is_found()).count();
             let others = rows
                 .iter()

@@ -1,5 +1,33 @@
 //! Counts and times as cells of a table.
 
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+
+/// The rows by a property.
+pub(super) fn grouped<'a, R>(
+    rows: &[&'a R],
+    of: impl Fn(&'a R) -> &'a str,
+) -> BTreeMap<&'a str, Vec<&'a R>> {
+    let mut groups: BTreeMap<&str, Vec<&R>> = BTreeMap::new();
+    for row in rows {
+        groups.entry(of(row)).or_default().push(row);
+    }
+    groups
+}
+
+/// The rows that pass a test.
+pub(super) fn those<'a, R>(rows: &[&'a R], test: impl Fn(&R) -> bool) -> Vec<&'a R> {
+    rows.iter().copied().filter(|row| test(row)).collect()
+}
+
+/// A list item with the share of the rows that pass a test; nothing without rows.
+pub(super) fn item<R>(text: &mut String, what: &str, rows: &[&R], test: &dyn Fn(&R) -> bool) {
+    if !rows.is_empty() {
+        let hits = rows.iter().filter(|row| test(row)).count();
+        let _ = writeln!(text, "- {what}: {}", bounded(hits, rows.len()));
+    }
+}
+
 /// "3/4", or nothing of nothing.
 pub(super) fn share<'a, R>(rows: &[&'a R], test: impl Fn(&'a R) -> bool) -> String {
     let hits = rows.iter().filter(|row| test(row)).count();

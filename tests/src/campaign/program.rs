@@ -88,6 +88,28 @@ impl Program {
         }
     }
 
+    /// Runs `fill` in the folder of the case `key`: a kept one, which is removed if `is_right` accepts the result, or a
+    /// temporary one.
+    pub(super) fn in_folder<R>(
+        &self,
+        key: &str,
+        row: &mut R,
+        fill: impl FnOnce(&mut R, &Path) -> Result<(), String>,
+        is_right: impl FnOnce(&R) -> bool,
+    ) -> Option<String> {
+        let Some(keep) = &self.keep else {
+            let scratch = tempfile::tempdir().map_err(|e| e.to_string());
+            return scratch.and_then(|folder| fill(row, folder.path())).err();
+        };
+        let folder = keep.join(key.replace('/', "_"));
+        let failure = fill(row, &folder).err();
+        if failure.is_none() && is_right(row) {
+            // Failures to remove a folder are harmless.
+            let _ = fs::remove_dir_all(&folder);
+        }
+        failure
+    }
+
     /// Runs a command with `--json`; returns its document and duration.
     pub(super) fn json(
         &self,

@@ -45,21 +45,10 @@ pub fn run(case: &Case, program: &Program) -> Row {
         identify: Spent::default(),
         diagnose: Spent::default(),
     };
-    let kept = (program.keep.as_ref()).map(|keep| keep.join(row.key.replace('/', "_")));
-    let outcome = match &kept {
-        Some(folder) => fill(&mut row, case, program, folder),
-        None => tempfile::tempdir()
-            .map_err(|e| e.to_string())
-            .and_then(|scratch| fill(&mut row, case, program, scratch.path())),
-    };
-    row.failure = outcome.err();
-    if row.is_right()
-        && row.parameters_hit() != Some(false)
-        && let Some(folder) = &kept
-    {
-        // Failures to remove a folder are harmless.
-        let _ = fs::remove_dir_all(folder);
-    }
+    let key = row.key.clone();
+    let is_right = |row: &Row| row.is_right() && row.parameters_hit() != Some(false);
+    let fill = |row: &mut Row, folder: &Path| fill(row, case, program, folder);
+    row.failure = program.in_folder(&key, &mut row, fill, is_right);
     row
 }
 

@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 use firmware_sim::family::Family;
 
 use super::case::Group;
-use super::counts::{bounded, seconds, share};
+use super::counts::{bounded, grouped, item, seconds, share, those};
 use super::row::{AT_FLOOR, Row};
 
 /// All results.
@@ -70,17 +70,13 @@ pub fn table(rows: &[Row]) -> String {
 }
 
 fn parameters(rows: &[&Row]) -> String {
-    let compared: Vec<&Row> = (rows.iter().copied())
-        .filter(|row| row.parameters_hit().is_some())
-        .collect();
+    let compared = those(rows, |row| row.parameters_hit().is_some());
     share(&compared, |row| row.parameters_hit() == Some(true))
 }
 
 /// Four cells: wall and processor times of both programs.
 fn times(rows: &[&Row]) -> String {
-    let done: Vec<&Row> = (rows.iter().copied())
-        .filter(|row| row.failure.is_none())
-        .collect();
+    let done = those(rows, |row| row.failure.is_none());
     let cells = [
         seconds(&done, |row| Some(row.identify.wall_s)),
         seconds(&done, |row| row.identify.cpu_s),
@@ -109,9 +105,7 @@ fn counts(rows: &[&Row]) -> String {
 fn by_family(rows: &[&Row]) -> String {
     let mut text = format!("| family | {HEAD}|---|{RULE}");
     for family in Family::ALL {
-        let own: Vec<&Row> = (rows.iter().copied())
-            .filter(|row| row.family == family.name())
-            .collect();
+        let own = those(rows, |row| row.family == family.name());
         if !own.is_empty() {
             let _ = write!(text, "| {} | {}", family.name(), counts(&own));
         }
@@ -121,12 +115,8 @@ fn by_family(rows: &[&Row]) -> String {
 }
 
 fn by(rows: &[&Row], what: &str, of: impl Fn(&Row) -> &str) -> String {
-    let mut groups: BTreeMap<&str, Vec<&Row>> = BTreeMap::new();
-    for row in rows {
-        groups.entry(of(row)).or_default().push(row);
-    }
     let mut text = format!("| {what} | {HEAD}|---|{RULE}");
-    for (name, own) in groups {
+    for (name, own) in grouped(rows, of) {
         let _ = write!(text, "| {name} | {}", counts(&own));
     }
     text
@@ -204,11 +194,7 @@ fn totals(rows: &[Row]) -> String {
     };
     let mut text = String::new();
     let mut line = |what: &str, rows: &[&Row], test: &dyn Fn(&Row) -> bool| {
-        if rows.is_empty() {
-            return;
-        }
-        let hits = rows.iter().filter(|row| test(row)).count();
-        let _ = writeln!(text, "- {what}: {}", bounded(hits, rows.len()));
+        item(&mut text, what, rows, test);
     };
     let single = of(&[Group::Single]);
     line("hidden effect first", &single, &Row::is_found);

@@ -7,6 +7,7 @@ mod pictures;
 mod print;
 mod report;
 mod speed;
+mod tab;
 mod terms;
 
 use std::io::{BufRead, BufReader};
@@ -14,11 +15,10 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::Instant;
 
-use scenarios::browser::{Browser, Page};
 use scenarios::program;
 use serde_json::Value;
 
-use pictures::shoot;
+use tab::{Tab, Window};
 
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
@@ -65,26 +65,6 @@ const RECORDS: [(&str, &str); 4] = [
     ("random-b", "validate"),
 ];
 
-/// Evaluates an expression on a page.
-#[track_caller]
-fn act(b: &mut Browser, page: &Page, expression: &str) -> Value {
-    b.eval(page, expression).expect("an expression of the test")
-}
-
-/// Waits until an expression is true; the time limit is generous for an idle machine.
-#[track_caller]
-fn until(b: &mut Browser, page: &Page, seconds: u64, expression: &str) {
-    const BUSY: u64 = 3;
-    if let Err(error) = b.wait(page, expression, BUSY * seconds) {
-        let said = b.eval(
-            page,
-            "document.getElementById('message')?.textContent ?? ''",
-        );
-        let _ = b.screenshot(page, &picture("failed.png"));
-        panic!("{error}; the page says {said:?}");
-    }
-}
-
 /// Path of a picture to be inspected.
 fn picture(name: &str) -> PathBuf {
     let folder = program()
@@ -92,38 +72,6 @@ fn picture(name: &str) -> PathBuf {
         .expect("target/release")
         .join("../browser");
     folder.join(name)
-}
-
-/// WCAG 2.1 A and AA, as far as a program can check them.
-#[track_caller]
-fn accessible(b: &mut Browser, page: &Page) {
-    let path = root().join("host-fit/web/node_modules/axe-core/axe.min.js");
-    let axe = std::fs::read_to_string(path).expect("axe-core: run `cargo xtask pages`");
-    act(b, page, &format!("{axe};1"));
-    let found = act(
-        b,
-        page,
-        "axe.run(document, {runOnly: ['wcag2a', 'wcag2aa', 'wcag21a', 'wcag21aa']}).then(r => r.violations.map(v => v.id + ': ' + v.nodes.length + ' ' + v.nodes[0].html.slice(0, 160) + ' ' + v.nodes[0].failureSummary))",
-    );
-    assert_eq!(found, Value::Array(Vec::new()), "{found:#}");
-}
-
-/// No page is wider than a phone.
-#[track_caller]
-fn fits(b: &mut Browser, page: &Page, width: f64) {
-    let wide = act(b, page, "document.documentElement.scrollWidth");
-    assert!(wide.as_f64() <= Some(width), "{wide} px wide on {width} px");
-}
-
-/// Words in pictures are at least 11 px high as they are seen, and nothing of them is cut off at the picture's edge.
-#[track_caller]
-fn readable(b: &mut Browser, page: &Page) {
-    let wrong = act(
-        b,
-        page,
-        "[...document.querySelectorAll('figure svg')].filter(s => s.clientWidth > 0).flatMap(s => { const box = s.getBoundingClientRect(), scale = box.width / s.viewBox.baseVal.width; return [...s.querySelectorAll('text')].flatMap(t => { const r = t.getBoundingClientRect(), px = scale * Number(t.getAttribute('font-size')); return px < 11 ? [`${px.toFixed(1)} px: ${t.textContent}`] : r.left < box.left - 1 || r.right > box.right + 1 || t.textContent.endsWith('…') ? [`cut: ${t.textContent}`] : []; }); })",
-    );
-    assert_eq!(wrong, Value::Array(Vec::new()), "{wrong:#}");
 }
 
 /// The workbench, serving; ends with this value, as abruptly as a power cut.
@@ -165,36 +113,11 @@ fn serve(project: &Path, rest: &[&dyn AsRef<std::ffi::OsStr>]) -> Served {
     }
 }
 
-/// No task runs, and there are this many models.
-fn idle_with(models: usize) -> String {
-    format!(
-        "document.getElementById('work').hidden && document.querySelectorAll('.model').length === {models}"
-    )
-}
-
-/// Pans the records of a page, with everything in sight redrawn in each frame. Returns the milliseconds of the
-/// page's own thread per frame, and the duration of a frame by this machine's clock under its present load.
-fn panned(b: &mut Browser, page: &Page) -> f64 {
-    const FRAMES: u32 = 120;
-    let before = b.worked(page).expect("its time");
-    let frame = act(
-        b,
-        page,
-        &format!(
-            "(async () => {{ const v = hostFit.groups[0].view; const times = []; let last = performance.now(); for (let i = 0; i < {FRAMES}; i++) {{ v.show(i * 0.03, 5 + i * 0.03); await new Promise(r => requestAnimationFrame(r)); const now = performance.now(); times.push(now - last); last = now; }} return times.sort((a, b) => a - b)[{FRAMES} / 2]; }})()"
-        ),
-    );
-    let worked = b.worked(page).expect("its time") - before;
-    let (own, clock) = (
-        1000.0 * worked / f64::from(FRAMES),
-        frame.as_f64().expect("ms"),
-    );
-    eprintln!("  panned: {own:.1} ms of the page's thread in a frame; {clock:.1} ms by the clock");
-    own
-}
-
 /// Largest time of a page's thread per frame on any machine, ms: at 30 frames a second a frame lasts 33.
 const SLOWEST_FRAME: f64 = 80.0;
+
+/// Size of a window, px.
+const SIZE: (u32, u32) = (1100, 1000);
 
 /// A short identification.
 fn identify(evaluations: u32) -> String {

@@ -5,10 +5,9 @@
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
-use scenarios::browser::{Browser, Page};
 use serde_json::Value;
 
-use super::{act, picture, root};
+use super::{Tab, picture, root};
 
 /// Largest mean difference of the greys, of 255: another font makes 1 to 3, a page in wrong colours about 200, a
 /// missing section 15.
@@ -20,41 +19,43 @@ const SMALL: &str = "async (address) => { const i = new Image(); i.src = address
 /// A PNG of 64 × 64 greys, base64.
 const PNG: &str = "async (greys) => { const c = new OffscreenCanvas(64, 64), x = c.getContext('2d'), d = x.createImageData(64, 64); greys.forEach((g, k) => d.data.set([g, g, g, 255], 4 * k)); x.putImageData(d, 0, 0); const b = new Uint8Array(await (await c.convertToBlob()).arrayBuffer()); return btoa(String.fromCharCode(...b)); }";
 
-/// Takes a picture, an artefact of CI, and compares it with the inspected one.
-#[track_caller]
-pub(crate) fn shoot(b: &mut Browser, page: &Page, name: &str) {
-    let path = picture(name);
-    b.screenshot(page, &path).expect("a picture");
-    // A separate page, because the tested page forbids foreign pictures and must not be changed.
-    let desk = b.open("about:blank", (64, 64), false).expect("a page");
-    let taken = greys(b, &desk, &std::fs::read(&path).expect("the picture"));
-    let known = root().join("tests/tests/browser/pictures").join(name);
-    if std::env::var_os("BLESS").is_some() {
-        let text = act(b, &desk, &format!("({PNG})({})", serde_json::json!(taken)));
-        let png = STANDARD.decode(text.as_str().expect("base64"));
-        std::fs::create_dir_all(known.parent().expect("a folder")).expect("a folder");
-        std::fs::write(&known, png.expect("base64")).expect("a file");
-    } else {
-        let known = std::fs::read(&known).unwrap_or_else(|_| {
-            panic!("{name} has no thumbnail: look at it, then `cargo xtask browser --bless`")
-        });
-        let known = greys(b, &desk, &known);
-        let sum: f64 = taken.iter().zip(&known).map(|(a, k)| (a - k).abs()).sum();
-        let mean = sum / taken.len() as f64;
-        eprintln!("           {name}: {mean:.1} of 255 from the one that was looked at");
-        assert!(
-            mean < DIFFERENCE,
-            "{} is {mean:.1} of 255 from the picture that was looked at; if it is right, `cargo xtask browser --bless`",
-            path.display()
-        );
+impl Tab<'_> {
+    /// Takes a picture, an artefact of CI, and compares it with the inspected one.
+    #[track_caller]
+    pub(crate) fn shoot(&self, name: &str) {
+        let path = picture(name);
+        self.screenshot(&path);
+        // A separate page, because the tested page forbids foreign pictures and must not be changed.
+        let desk = self.empty((64, 64));
+        let taken = greys(&desk, &std::fs::read(&path).expect("the picture"));
+        let known = root().join("tests/tests/browser/pictures").join(name);
+        if std::env::var_os("BLESS").is_some() {
+            let text = desk.act(&format!("({PNG})({})", serde_json::json!(taken)));
+            let png = STANDARD.decode(text.as_str().expect("base64"));
+            std::fs::create_dir_all(known.parent().expect("a folder")).expect("a folder");
+            std::fs::write(&known, png.expect("base64")).expect("a file");
+        } else {
+            let known = std::fs::read(&known).unwrap_or_else(|_| {
+                panic!("{name} has no thumbnail: look at it, then `cargo xtask browser --bless`")
+            });
+            let known = greys(&desk, &known);
+            let sum: f64 = taken.iter().zip(&known).map(|(a, k)| (a - k).abs()).sum();
+            let mean = sum / taken.len() as f64;
+            eprintln!("           {name}: {mean:.1} of 255 from the one that was looked at");
+            assert!(
+                mean < DIFFERENCE,
+                "{} is {mean:.1} of 255 from the picture that was looked at; if it is right, `cargo xtask browser --bless`",
+                path.display()
+            );
+        }
+        desk.close();
     }
-    b.close(&desk).expect("closed");
 }
 
 /// A picture, PNG, as 64 × 64 greys.
-fn greys(b: &mut Browser, desk: &Page, png: &[u8]) -> Vec<f64> {
+fn greys(desk: &Tab<'_>, png: &[u8]) -> Vec<f64> {
     let address = format!("data:image/png;base64,{}", STANDARD.encode(png));
-    let told = act(b, desk, &format!("({SMALL})('{address}')"));
+    let told = desk.act(&format!("({SMALL})('{address}')"));
     let greys = told.as_array().into_iter().flatten();
     let greys: Vec<f64> = greys.filter_map(Value::as_f64).collect();
     assert_eq!(greys.len(), 64 * 64, "greys of a picture");

@@ -2,10 +2,8 @@
 
 use std::io::Read as _;
 
+use super::{SIZE, Window, picture};
 use flate2::read::ZlibDecoder;
-use scenarios::browser::Browser;
-
-use super::{act, picture, until};
 
 /// Line segments that the pages of a PDF draw: operators `l` in its unpacked content streams.
 fn segments(pdf: &[u8]) -> usize {
@@ -35,42 +33,29 @@ fn segments(pdf: &[u8]) -> usize {
 
 /// Prints a page of `records` records, and sees that nothing of it is lost.
 #[track_caller]
-pub(crate) fn keeps_its_curves(b: &mut Browser, address: &str, records: usize) {
+pub(crate) fn keeps_its_curves(b: &Window, address: &str, records: usize) {
     // Printed from a dark screen: the paper is white nevertheless.
-    let page = b.open(address, (1100, 1000), true).expect("a page");
-    until(
-        b,
-        &page,
+    let page = b.open_dark(address, SIZE);
+    page.until(
         20,
         &format!("hostFit.groups[0].charts.length === {records}"),
     );
-    let pdf = b.pdf(&page).expect("a PDF");
+    let pdf = page.pdf();
     let kept = picture("report.pdf");
     std::fs::create_dir_all(kept.parent().expect("a folder")).expect("a folder");
     std::fs::write(&kept, &pdf).expect("a file");
     let with = segments(&pdf);
     // The same page without its curves.
-    act(
-        b,
-        &page,
-        "(() => { hostFit.groups[0].paper = () => {}; return true; })()",
-    );
-    let without = segments(&b.pdf(&page).expect("a PDF"));
+    page.act("(() => { hostFit.groups[0].paper = () => {}; return true; })()");
+    let without = segments(&page.pdf());
     eprintln!("  printed: {with} line segments, {without} without the records");
     // Records with measurement, model and residual, some hundred segments each.
     assert!(with > without + records * 3 * 200, "{with} and {without}");
     // The screen is as it was.
-    until(
-        b,
-        &page,
-        5,
-        "document.querySelectorAll('.paper').length === 0",
-    );
-    until(
-        b,
-        &page,
+    page.has(5, ".paper", 0);
+    page.until(
         5,
         "!document.documentElement.classList.contains('on-paper')",
     );
-    b.close(&page).expect("closed");
+    page.close();
 }

@@ -4,9 +4,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 use std::time::Instant;
 
-use scenarios::browser::Browser;
-
-use super::{SLOWEST_FRAME, act, panned, root, serve, until};
+use super::{SIZE, SLOWEST_FRAME, Window, root, serve};
 
 /// A record of a flow that lags behind the valve, with repeatable noise.
 fn record(samples: usize, period: f64) -> String {
@@ -41,22 +39,15 @@ fn set(folder: &Path, records: usize, samples: usize) {
 fn long_records_open_and_pan_smoothly() {
     eprintln!("speed");
     let folder = tempfile::tempdir().expect("a folder");
-    let mut b = Browser::start().expect("chromium");
+    let b = Window::start();
 
     // Ten minutes at 1 kHz in the workbench.
     let long = folder.path().join("long");
     set(&long, 1, 600_000);
     let served = serve(&folder.path().join("project"), &[&long]);
     let started = Instant::now();
-    let page = b
-        .open(&served.address, (1100, 1000), false)
-        .expect("a page");
-    until(
-        &mut b,
-        &page,
-        60,
-        "document.querySelectorAll('.record canvas').length > 0",
-    );
+    let page = b.open(&served.address, SIZE);
+    page.until(60, "document.querySelectorAll('.record canvas').length > 0");
     let opened = started.elapsed().as_secs_f64();
     eprintln!(
         "  600 000 samples: server ready after {:.2} s, drawn {opened:.2} s after the page was asked for",
@@ -85,34 +76,17 @@ fn long_records_open_and_pan_smoothly() {
         );
     }
     let served = serve(&project, &[&eight]);
-    let page = b
-        .open(
-            &format!("{}#beside=1,2", served.address),
-            (1100, 1000),
-            false,
-        )
-        .expect("a page");
-    until(
-        &mut b,
-        &page,
-        60,
-        "hostFit.groups[0].payload.runs.length === 3",
-    );
-    act(
-        &mut b,
-        &page,
-        "document.querySelectorAll('.record')[3].scrollIntoView()",
-    );
-    until(
-        &mut b,
-        &page,
+    let page = b.open(&format!("{}#beside=1,2", served.address), SIZE);
+    page.until(60, "hostFit.groups[0].payload.runs.length === 3");
+    page.act("document.querySelectorAll('.record')[3].scrollIntoView()");
+    page.until(
         20,
         "document.querySelectorAll('.record canvas').length >= 4",
     );
     eprintln!("  8 × 10 000 × 3");
-    assert!(panned(&mut b, &page) < SLOWEST_FRAME);
+    assert!(page.panned() < SLOWEST_FRAME);
 
     // Within 2 s on an idle machine.
     assert!(opened < 10.0, "600 000 samples took {opened} s");
-    assert_eq!(b.faults(), Vec::<String>::new());
+    b.has_no_faults();
 }

@@ -4,12 +4,8 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use scenarios::browser::Browser;
+use super::{SIZE, Steps, Window, serve};
 
-use super::pictures::shoot;
-use super::{Steps, accessible, act, idle_with, serve, until};
-
-const SIZE: (u32, u32) = (1100, 1000);
 const PERIOD_S: f64 = 0.002;
 
 /// Numbers that repeat.
@@ -93,78 +89,36 @@ fn a_term_that_no_catalogue_has_is_found_and_taken_as_a_formula() {
     let mut steps = Steps::new("a term");
     let project = folder.path().join("project");
     let served = serve(&project, &[&data]);
-    let mut b = Browser::start().expect("chromium");
-    let page = b.open(&served.address, SIZE, false).expect("a page");
-    until(
-        &mut b,
-        &page,
-        20,
-        "document.querySelectorAll('.record').length === 5",
-    );
-    act(&mut b, &page, LEAN);
-    until(&mut b, &page, 60, &idle_with(1));
+    let b = Window::start();
+    let page = b.open(&served.address, SIZE);
+    page.has(20, ".record", 5);
+    page.act(LEAN);
+    page.idles_with(60, 1);
     steps.done("identified");
-    act(&mut b, &page, "document.getElementById('discover').click()");
-    until(&mut b, &page, 300, &idle_with(2));
-    until(
-        &mut b,
-        &page,
+    page.click("#discover");
+    page.idles_with(300, 2);
+    page.until(
         20,
         "document.querySelectorAll('.model')[1].textContent.includes('-by-pulse-number')",
     );
     steps.done("discovered");
     // The finding appears in the section of the search: the page stays with its model and links to the new one.
-    until(
-        &mut b,
-        &page,
-        20,
-        "document.querySelector('.model.current').textContent.startsWith('1.') && document.getElementById('go-on').textContent === 'Go to model 2'",
-    );
-    until(
-        &mut b,
-        &page,
-        20,
-        "document.querySelector('#discovery svg') !== null && document.querySelector('#discovery h3').textContent.includes('pulse number')",
-    );
-    act(
-        &mut b,
-        &page,
-        "document.getElementById('discovery-section').scrollIntoView()",
-    );
-    shoot(&mut b, &page, "workbench-term.png");
-    accessible(&mut b, &page);
-    let formula = act(
-        &mut b,
-        &page,
-        "document.querySelector('#discovery code').textContent",
-    );
-    assert!(
-        formula.as_str().is_some_and(|text| text.contains("exp(")),
-        "{formula}"
-    );
+    page.until(20, "document.querySelector('.model.current').textContent.startsWith('1.') && document.getElementById('go-on').textContent === 'Go to model 2'");
+    page.until(20, "document.querySelector('#discovery svg') !== null && document.querySelector('#discovery h3').textContent.includes('pulse number')");
+    page.scroll_to("#discovery-section");
+    page.shoot("workbench-term.png");
+    page.accessible();
+    let formula = page.text("#discovery code");
+    assert!(formula.contains("exp("), "{formula}");
     // The formula goes into the editor as an effect file, and from there into the model.
-    act(
-        &mut b,
-        &page,
-        "[...document.querySelectorAll('#discovery button')].find(x => x.textContent === 'Open its effect file').click()",
-    );
-    until(
-        &mut b,
-        &page,
-        20,
-        "document.getElementById('own-told').textContent.includes('-by-pulse-number') && document.getElementById('own-text').value.includes('exp(')",
-    );
-    act(&mut b, &page, "document.getElementById('own-add').click()");
-    until(&mut b, &page, 60, &idle_with(3));
-    let times_noise = act(
-        &mut b,
-        &page,
-        "fetch('/api/state', {headers: {'x-token': new URLSearchParams(location.search).get('token')}}).then(r => r.json()).then(s => { const m = s.models.at(-1); return m.rmse / m.noise_rmse; })",
-    );
-    eprintln!("  the validation error is {times_noise} times the noise");
-    assert!(times_noise.as_f64() < Some(1.15), "{times_noise}");
+    page.click_text("#discovery button", "Open its effect file");
+    page.until(20, "document.getElementById('own-told').textContent.includes('-by-pulse-number') && document.getElementById('own-text').value.includes('exp(')");
+    page.click("#own-add");
+    page.idles_with(60, 3);
+    let times_noise = page.times_noise();
+    assert!(times_noise < 1.15, "{times_noise}");
     steps.done("as a formula in the model");
-    assert_eq!(b.faults(), Vec::<String>::new());
+    b.has_no_faults();
 }
 
 #[test]
@@ -186,42 +140,23 @@ fn the_experiment_that_tells_is_drawn_and_saved() {
     let mut steps = Steps::new("what the records cannot tell");
     let project = folder.path().join("project");
     let served = serve(&project, &[&data]);
-    let mut b = Browser::start().expect("chromium");
-    let page = b.open(&served.address, SIZE, false).expect("a page");
-    until(
-        &mut b,
-        &page,
-        20,
-        "document.querySelectorAll('.record').length === 3",
-    );
-    act(&mut b, &page, LEAN);
-    until(&mut b, &page, 60, &idle_with(1));
+    let b = Window::start();
+    let page = b.open(&served.address, SIZE);
+    page.has(20, ".record", 3);
+    page.act(LEAN);
+    page.idles_with(60, 1);
     steps.done("identified");
-    act(&mut b, &page, "document.getElementById('diagnose').click()");
-    until(
-        &mut b,
-        &page,
-        300,
-        "document.getElementById('work').hidden && document.querySelector('#missing h3')?.textContent.startsWith('Experiment that distinguishes')",
-    );
+    page.click("#diagnose");
+    page.until(300, "document.getElementById('work').hidden && document.querySelector('#missing h3')?.textContent.startsWith('Experiment that distinguishes')");
     steps.done("diagnosed");
-    act(
-        &mut b,
-        &page,
-        "document.querySelector('#missing h3').scrollIntoView()",
-    );
-    shoot(&mut b, &page, "workbench-experiment.png");
-    accessible(&mut b, &page);
-    let csv = act(
-        &mut b,
-        &page,
-        "fetch([...document.querySelectorAll('#missing a')].find(a => a.textContent.includes('experiment.csv')).href).then(r => r.text())",
-    );
-    let csv = csv.as_str().expect("text");
+    page.scroll_to("#missing h3");
+    page.shoot("workbench-experiment.png");
+    page.accessible();
+    let csv = page.download("#missing a", "experiment.csv");
     let mut rows = csv.lines().map(|line| line.split(',').collect::<Vec<_>>());
     assert_eq!(rows.next(), Some(vec!["t", "u"]));
     let switches: Vec<&str> = rows.map(|row| row[1]).collect();
     let edges = switches.windows(2).filter(|w| w[0] != w[1]).count();
     assert!(switches.len() > 500 && edges > 5, "{edges} edges");
-    assert_eq!(b.faults(), Vec::<String>::new());
+    b.has_no_faults();
 }

@@ -11,14 +11,9 @@ use crate::campaign::program::Program;
 #[must_use]
 pub fn run(case: &Case, program: &Program) -> Row {
     let mut row = Row::of(case);
-    let kept = (program.keep.as_ref()).map(|keep| keep.join(row.key.replace('/', "_")));
-    let outcome = match &kept {
-        Some(folder) => fill(&mut row, case, program, folder),
-        None => tempfile::tempdir()
-            .map_err(|e| e.to_string())
-            .and_then(|scratch| fill(&mut row, case, program, scratch.path())),
-    };
-    row.failure = outcome.err();
+    let key = row.key.clone();
+    let fill = |row: &mut Row, folder: &Path| fill(row, case, program, folder);
+    row.failure = program.in_folder(&key, &mut row, fill, |_| false);
     row
 }
 

@@ -1,10 +1,9 @@
 //! The campaign's table, as Markdown for the docs.
 
-use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use super::row::Row;
-use crate::campaign::counts::{bounded, share};
+use crate::campaign::counts::{grouped, item, share, those};
 
 /// A model counts as at the noise level up to this ratio.
 const AT_THE_NOISE: f64 = 1.05;
@@ -12,26 +11,20 @@ const AT_THE_NOISE: f64 = 1.05;
 /// The results by published model.
 #[must_use]
 pub fn table(rows: &[Row]) -> String {
-    let mut models: BTreeMap<&str, Vec<&Row>> = BTreeMap::new();
-    for row in rows {
-        models.entry(&row.model).or_default().push(row);
-    }
+    let all: Vec<&Row> = rows.iter().collect();
+    let models = grouped(&all, |row| &row.model);
     let mut text = "| model | named first | in its set | first surrogate | wrong name | nulls with a wrong name | given / noise | best / noise | at the noise | CPU s |\n\
                     |---|---|---|---|---|---|---|---|---|---|\n"
         .to_owned();
-    let all: Vec<&Row> = rows.iter().collect();
     let lines = models.iter().map(|(name, own)| (*name, own));
     for (name, own) in lines.chain([("all", &all)]) {
         let _ = writeln!(text, "| {name} | {} |", cells(own).join(" | "));
     }
     text += "\nColumns with two numbers: median / largest.\n\n";
-    let effects: Vec<&Row> = rows.iter().filter(|row| !row.is_null()).collect();
-    let nulls: Vec<&Row> = rows.iter().filter(|row| row.is_null()).collect();
+    let effects = those(&all, |row| !row.is_null());
+    let nulls = those(&all, Row::is_null);
     let mut line = |what: &str, of: &[&Row], test: &dyn Fn(&Row) -> bool| {
-        if !of.is_empty() {
-            let hits = of.iter().filter(|row| test(row)).count();
-            let _ = writeln!(text, "- {what}: {}", bounded(hits, of.len()));
-        }
+        item(&mut text, what, of, test);
     };
     line("named, in the set or first surrogate", &effects, &|row| {
         row.is_named_first() || row.is_in_set() || row.is_first_surrogate()
@@ -67,11 +60,8 @@ pub fn table(rows: &[Row]) -> String {
 }
 
 fn cells(rows: &[&Row]) -> Vec<String> {
-    let of = |null: bool| -> Vec<&Row> {
-        let own = rows.iter().copied();
-        own.filter(|row| row.is_null() == null).collect()
-    };
-    let (effects, nulls) = (of(false), of(true));
+    let effects = those(rows, |row| !row.is_null());
+    let nulls = those(rows, Row::is_null);
     let spread = |of: &dyn Fn(&Row) -> Option<f64>, digits: usize| {
         let mut all: Vec<f64> = rows.iter().filter_map(|row| of(row)).collect();
         all.sort_by(f64::total_cmp);

@@ -22,20 +22,9 @@ use crate::campaign::run::structure;
 #[must_use]
 pub fn run(case: &Case, program: &Program, terms: u32) -> Row {
     let mut row = Row::of(case);
-    let kept = (program.keep.as_ref()).map(|keep| keep.join(row.key.replace('/', "_")));
-    let outcome = match &kept {
-        Some(folder) => fill(&mut row, case, program, terms, folder),
-        None => tempfile::tempdir()
-            .map_err(|e| e.to_string())
-            .and_then(|scratch| fill(&mut row, case, program, terms, scratch.path())),
-    };
-    row.failure = outcome.err();
-    if row.is_right()
-        && let Some(folder) = &kept
-    {
-        // Failures to remove a folder are harmless.
-        let _ = fs::remove_dir_all(folder);
-    }
+    let key = row.key.clone();
+    let fill = |row: &mut Row, folder: &Path| fill(row, case, program, terms, folder);
+    row.failure = program.in_folder(&key, &mut row, fill, Row::is_right);
     row
 }
 

@@ -1,13 +1,12 @@
 //! The campaign's tables, as Markdown for the docs.
 
-use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use firmware_sim::family::Family;
 
 use super::row::{ENOUGH, Row};
 use crate::campaign::case::Group;
-use crate::campaign::counts::{bounded, seconds, share};
+use crate::campaign::counts::{grouped, item, seconds, share, those};
 
 /// All results.
 #[must_use]
@@ -87,9 +86,7 @@ fn counts(rows: &[&Row]) -> String {
 
 /// Two cells: median and longest of identification and search.
 fn times(rows: &[&Row]) -> String {
-    let done: Vec<&Row> = (rows.iter().copied())
-        .filter(|row| row.failure.is_none())
-        .collect();
+    let done = those(rows, |row| row.failure.is_none());
     let cells = [
         seconds(&done, |row| Some(row.identify.wall_s)),
         seconds(&done, |row| Some(row.discover.wall_s)),
@@ -98,12 +95,8 @@ fn times(rows: &[&Row]) -> String {
 }
 
 fn by(rows: &[&Row], what: &str, of: impl Fn(&Row) -> &str) -> String {
-    let mut groups: BTreeMap<&str, Vec<&Row>> = BTreeMap::new();
-    for row in rows {
-        groups.entry(of(row)).or_default().push(row);
-    }
     let mut text = format!("| {what} | {HEAD}|---|{RULE}");
-    for (name, own) in groups {
+    for (name, own) in grouped(rows, of) {
         let _ = write!(text, "| {name} | {}", counts(&own));
     }
     let _ = write!(text, "| all | {}", counts(rows));
@@ -126,19 +119,13 @@ fn nulls(rows: &[&Row]) -> String {
         );
     };
     for family in Family::ALL {
-        let own: Vec<&Row> = (rows.iter().copied())
-            .filter(|row| row.family == family.name())
-            .collect();
+        let own = those(rows, |row| row.family == family.name());
         if !own.is_empty() {
             line(&format!("family {}", family.name()), &own);
         }
     }
-    let mut groups: BTreeMap<&str, Vec<&Row>> = BTreeMap::new();
-    for row in rows {
-        groups.entry(&row.circumstances).or_default().push(row);
-    }
-    for (what, own) in &groups {
-        line(what, own);
+    for (what, own) in grouped(rows, |row| &row.circumstances) {
+        line(what, &own);
     }
     line("all", rows);
     text
@@ -148,10 +135,7 @@ fn nulls(rows: &[&Row]) -> String {
 fn totals(beyond: &[&Row], single: &[&Row], nothing: &[&Row]) -> String {
     let mut text = String::new();
     let mut line = |what: &str, rows: &[&Row], test: &dyn Fn(&Row) -> bool| {
-        if !rows.is_empty() {
-            let hits = rows.iter().filter(|row| test(row)).count();
-            let _ = writeln!(text, "- {what}: {}", bounded(hits, rows.len()));
-        }
+        item(&mut text, what, rows, test);
     };
     line("place", beyond, &Row::has_place);
     line("place, or in its set", beyond, &Row::has_place_in_set);
@@ -161,15 +145,11 @@ fn totals(beyond: &[&Row], single: &[&Row], nothing: &[&Row]) -> String {
         beyond,
         &Row::has_coordinate_in_set,
     );
-    let regional: Vec<&Row> = (beyond.iter().copied())
-        .filter(|row| row.regional)
-        .collect();
+    let regional = those(beyond, |row| row.regional);
     line("region with F1 of 0.85", &regional, &|row| {
         row.region_f1.is_some_and(|f1| f1 >= 0.85)
     });
-    let told: Vec<&Row> = (regional.iter().copied())
-        .filter(|row| row.base_bias.is_some())
-        .collect();
+    let told = those(&regional, |row| row.base_bias.is_some());
     line("base within 2 % beside a region", &told, &|row| {
         row.base_bias.is_some_and(|bias| bias <= 0.02)
     });

@@ -44,113 +44,51 @@ pub(super) struct Kind {
     pub(super) draw: fn(&mut ChaCha8Rng) -> Drawn,
 }
 
+const fn kind(name: &'static str, what: &'static str, draw: fn(&mut ChaCha8Rng) -> Drawn) -> Kind {
+    Kind { name, what, draw }
+}
+
 /// In the order in which they are drawn.
 pub(super) const KINDS: &[Kind] = &[
-    Kind {
-        name: "one-pulse",
-        what: "one step or one pulse",
-        draw: one_pulse,
-    },
-    Kind {
-        name: "second-order",
-        what: "two lags in series",
-        draw: |rng| of_lags(rng, 2),
-    },
-    Kind {
-        name: "third-order",
-        what: "three lags in series",
-        draw: |rng| of_lags(rng, 3),
-    },
-    Kind {
-        name: "valve-open",
-        what: "at rest with the command on",
-        draw: valve_open,
-    },
-    Kind {
-        name: "mid-run",
-        what: "begins in mid-run",
-        draw: mid_run,
-    },
-    Kind {
-        name: "thermostat",
-        what: "switched by a thermostat",
-        draw: thermostat,
-    },
-    Kind {
-        name: "graded",
-        what: "a command of many levels",
-        draw: graded,
-    },
-    Kind {
-        name: "quantised",
-        what: "a coarse converter",
-        draw: quantised,
-    },
-    Kind {
-        name: "two-records",
-        what: "two records",
-        draw: |rng| several(rng, 2, 0.0),
-    },
-    Kind {
-        name: "zeros-apart",
-        what: "three records with zeros apart",
-        draw: |rng| several(rng, 3, 3.0),
-    },
-    Kind {
-        name: "binary-sequence",
-        what: "a pseudo-random binary sequence",
-        draw: binary_sequence,
-    },
-    Kind {
-        name: "held-out",
-        what: "the tail of one run is held out",
-        draw: held_out,
-    },
-    Kind {
-        name: "coloured",
-        what: "noise with memory",
-        draw: coloured,
-    },
-    Kind {
-        name: "outliers",
-        what: "heavy-tailed noise",
-        draw: outliers,
-    },
-    Kind {
-        name: "measured-input",
-        what: "another input that is measured",
-        draw: measured_input,
-    },
-    Kind {
-        name: "unrelated-channel",
-        what: "a channel that has nothing to do with y",
-        draw: unrelated_channel,
-    },
-    Kind {
-        name: "spikes",
-        what: "single wrong readings",
-        draw: spikes,
-    },
-    Kind {
-        name: "drift",
-        what: "a drifting environment",
-        draw: drift,
-    },
-    Kind {
-        name: "ringing",
-        what: "a response that rings",
-        draw: ringing,
-    },
-    Kind {
-        name: "integrating",
-        what: "a tank that integrates",
-        draw: integrating,
-    },
-    Kind {
-        name: "own-row",
-        what: "a reading of the same moment as the command",
-        draw: own_row,
-    },
+    kind("one-pulse", "one step or one pulse", one_pulse),
+    kind("second-order", "two lags in series", |rng| of_lags(rng, 2)),
+    kind("third-order", "three lags in series", |rng| of_lags(rng, 3)),
+    kind("valve-open", "at rest with the command on", valve_open),
+    kind("mid-run", "begins in mid-run", mid_run),
+    kind("thermostat", "switched by a thermostat", thermostat),
+    kind("graded", "a command of many levels", graded),
+    kind("quantised", "a coarse converter", quantised),
+    kind("two-records", "two records", |rng| several(rng, 2, 0.0)),
+    kind("zeros-apart", "three records with zeros apart", |rng| {
+        several(rng, 3, 3.0)
+    }),
+    kind(
+        "binary-sequence",
+        "a pseudo-random binary sequence",
+        binary_sequence,
+    ),
+    kind("held-out", "the tail of one run is held out", held_out),
+    kind("coloured", "noise with memory", coloured),
+    kind("outliers", "heavy-tailed noise", outliers),
+    kind(
+        "measured-input",
+        "another input that is measured",
+        measured_input,
+    ),
+    kind(
+        "unrelated-channel",
+        "a channel that has nothing to do with y",
+        unrelated_channel,
+    ),
+    kind("spikes", "single wrong readings", spikes),
+    kind("drift", "a drifting environment", drift),
+    kind("ringing", "a response that rings", ringing),
+    kind("integrating", "a tank that integrates", integrating),
+    kind(
+        "own-row",
+        "a reading of the same moment as the command",
+        own_row,
+    ),
 ];
 
 /// A rig before its records are drawn.

@@ -69,15 +69,7 @@ impl Request {
 
 fn bench(arguments: &[String]) -> Result<()> {
     let request = Request::parse(arguments)?;
-    run(&mut cargo(&[
-        "build",
-        "--release",
-        "-q",
-        "-p",
-        "host-fit",
-        "-p",
-        "firmware-sim",
-    ]))?;
+    run(&mut cargo("build --release -q -p host-fit -p firmware-sim"))?;
     let programs = target().join("release");
     let folder = target().join("bench-search");
     let python = folder.join("venv").join("bin").join("python");

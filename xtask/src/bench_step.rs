@@ -30,18 +30,10 @@ fn bench_step(_arguments: &[String]) -> Result<()> {
     let mut version = DefaultHasher::new();
     version.write(&std::fs::read(&source)?);
     let exported = folder.join("exported.c");
-    run(cargo(&[
-        "run",
-        "--release",
-        "--quiet",
-        "--package",
-        "host-fit",
-        "--",
-        "codegen",
-    ])
-    .arg(root().join("firmware/identified/models/full.toml"))
-    .args(["--lang", "c", "-o"])
-    .arg(&exported))?;
+    run(cargo("run --release --quiet --package host-fit -- codegen")
+        .arg(root().join("firmware/identified/models/full.toml"))
+        .args(["--lang", "c", "-o"])
+        .arg(&exported))?;
     version.write(&std::fs::read(&exported)?);
     let linked = folder.join(format!("peer-{:016x}.o", version.finish()));
     let mut objects = Vec::new();

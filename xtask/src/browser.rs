@@ -31,16 +31,10 @@ pub(crate) fn browser(arguments: &[String]) -> Result<()> {
     }
     // The tests run the present program.
     program()?;
-    let mut tests = cargo(&[
-        "test",
-        "--release",
-        "--package=scenarios",
-        "--test=browser",
-        "--",
-        "--ignored",
-        "--nocapture",
-        "--test-threads=1",
-    ]);
+    let mut tests = cargo(
+        "test --release --package=scenarios --test=browser -- --ignored --nocapture \
+                --test-threads=1",
+    );
     if bless {
         tests.env("BLESS", "1");
     }

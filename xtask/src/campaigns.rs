@@ -42,20 +42,11 @@ pub(crate) const KEPT: Task = Task {
          sets in ../shared",
     run: |_| {
         program()?;
-        run(&mut cargo(&[
-            "test",
-            "--release",
-            "--no-fail-fast",
-            "--package=scenarios",
-            "--test=hidden_effects",
-            "--test=hidden_terms",
-            "--test=real_data",
-            "--test=strangers",
-            "--",
-            "--ignored",
-            "--nocapture",
-            "--test-threads=1",
-        ]))
+        run(&mut cargo(
+            "test --release --no-fail-fast --package=scenarios --test=hidden_effects \
+                --test=hidden_terms --test=real_data --test=strangers -- --ignored --nocapture \
+                --test-threads=1",
+        ))
     },
 };
 

@@ -112,7 +112,7 @@ fn rust_loop(folder: &Path) -> Result<String> {
     let mut export = program()?;
     export.args(["codegen", "firmware/identified/models/full.toml", "-o"]);
     run(export.arg(package.join("src/identified.rs")))?;
-    let mut loops = cargo(&["run", "--quiet"]);
+    let mut loops = cargo("run --quiet");
     loops
         .current_dir(&package)
         .env("CARGO_TARGET_DIR", target().join("examples"));

@@ -87,18 +87,12 @@ fn on_the_board(constants: Option<&Path>) -> Result<()> {
     let _ = process.wait();
     result?;
     let messages = output(
-        firmware_cargo(&[
-            "run",
-            "--release",
-            "--quiet",
-            "--package",
-            "log-reader",
-            // The test runs for a second; full optimisation would take minutes.
-            "--config=profile.release.opt-level=0",
-            "--config=profile.release.lto=\"off\"",
-            "--config=profile.release.codegen-units=16",
-            "--",
-        ])
+        // The test runs for a second; full optimisation would take minutes.
+        firmware_cargo(
+            "run --release --quiet --package log-reader \
+                --config=profile.release.opt-level=0 --config=profile.release.lto=\"off\" \
+                --config=profile.release.codegen-units=16 --",
+        )
         .arg(&elf)
         .arg(&log),
     )?;

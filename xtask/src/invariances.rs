@@ -8,7 +8,7 @@ pub(crate) const TASK: Task = Task {
     does: "tests that certain changes of records do not change the answer, on rigs drawn at random; --help for \
          its options",
     run: |arguments| {
-        run(&mut cargo(&["build", "--release", "--package", "host-fit"]))?;
+        run(&mut cargo("build --release --package host-fit"))?;
         run(scenario("invariances").args(arguments))
     },
 };

@@ -69,13 +69,9 @@ fn package(arguments: &[String]) -> Result<()> {
         [only] if only == "--verify" => true,
         _ => bail!("the only option is --verify"),
     };
-    let metadata = output(&mut cargo(&[
-        "metadata",
-        "--no-deps",
-        "--offline",
-        "--format-version",
-        "1",
-    ]))?;
+    let metadata = output(&mut cargo(
+        "metadata --no-deps --offline --format-version 1",
+    ))?;
     let metadata: Metadata = serde_json::from_str(&metadata).context("cargo metadata")?;
     let (published, kept): (Vec<Card>, Vec<Card>) =
         metadata.packages.into_iter().partition(Card::is_published);
@@ -83,7 +79,7 @@ fn package(arguments: &[String]) -> Result<()> {
 
     let mut packed = BTreeSet::new();
     for card in &published {
-        let list = cargo(&["package", "--list", "--allow-dirty", "--quiet", "--package"]);
+        let list = cargo("package --list --allow-dirty --quiet --package");
         let list = files(list, &card.name)?;
         for licence in ["LICENSE-MIT", "LICENSE-APACHE"] {
             if !list.contains(Path::new(licence)) {
@@ -94,13 +90,7 @@ fn package(arguments: &[String]) -> Result<()> {
     }
     faults.extend(outside(&packed)?);
 
-    let mut pack = cargo(&[
-        "package",
-        "--workspace",
-        "--offline",
-        "--allow-dirty",
-        "--quiet",
-    ]);
+    let mut pack = cargo("package --workspace --offline --allow-dirty --quiet");
     if !verify {
         pack.arg("--no-verify");
     }
@@ -170,7 +160,7 @@ fn cards(published: &[Card]) -> Vec<String> {
 /// The project's files that the programs are compiled from and no package contains.
 fn outside(packed: &BTreeSet<PathBuf>) -> Result<Vec<String>> {
     // `cargo test` compiles the programs without these lists.
-    let mut build = cargo(&["build", "--release", "--quiet"]);
+    let mut build = cargo("build --release --quiet");
     run(build.args(PROGRAMS.map(|program| format!("--package={program}"))))?;
     let mut missing = BTreeSet::new();
     let root = root();

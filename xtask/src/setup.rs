@@ -151,7 +151,7 @@ fn core_source() -> Option<Core> {
 
 /// `cargo` with the options to build for `target`; the caller adds the subcommand's own arguments.
 pub(crate) fn cross_cargo(subcommand: &str, target: &str) -> Result<Command> {
-    let mut build = cargo(&[subcommand, "--release", "--target", target]);
+    let mut build = cargo(&format!("{subcommand} --release --target {target}"));
     // With several codegen units, the same source gives other instructions: the worst sample of a law needs 2.5
     // times as many.
     build.env("CARGO_INCREMENTAL", "0");

@@ -17,10 +17,10 @@ pub(crate) fn command(program: &str, arguments: &[&str]) -> Command {
     command
 }
 
-/// `cargo` as it was called for this program, in the project's root.
-pub(crate) fn cargo(arguments: &[&str]) -> Command {
+/// `cargo` as it was called for this program, in the project's root, with the words of `line`.
+pub(crate) fn cargo(line: &str) -> Command {
     let program = std::env::var("CARGO").unwrap_or_else(|_| "cargo".to_owned());
-    command(&program, arguments)
+    command(&program, &line.split_whitespace().collect::<Vec<_>>())
 }
 
 /// Set if the workspace's programs are built already; a step then need not wait for another step's compiler.
@@ -31,7 +31,7 @@ pub(crate) fn scenario(program: &str) -> Command {
     if std::env::var_os(BUILT).is_some() {
         return built(program);
     }
-    let mut command = cargo(&["run", "--release", "--quiet", "--package", "scenarios"]);
+    let mut command = cargo("run --release --quiet --package scenarios");
     command.args(["--bin", program, "--"]);
     command
 }
@@ -39,13 +39,7 @@ pub(crate) fn scenario(program: &str) -> Command {
 /// The present `host-fit`; arguments follow.
 pub(crate) fn program() -> Result<Command> {
     if std::env::var_os(BUILT).is_none() {
-        run(&mut cargo(&[
-            "build",
-            "--release",
-            "--quiet",
-            "--package",
-            "host-fit",
-        ]))?;
+        run(&mut cargo("build --release --quiet --package host-fit"))?;
     }
     Ok(built("host-fit"))
 }
@@ -60,8 +54,8 @@ fn built(program: &str) -> Command {
 
 /// `cargo` in the firmware's workspace, with a separate target folder, because the two workspaces build the same
 /// crates with different features.
-pub(crate) fn firmware_cargo(arguments: &[&str]) -> Command {
-    let mut command = cargo(arguments);
+pub(crate) fn firmware_cargo(line: &str) -> Command {
+    let mut command = cargo(line);
     command
         .current_dir(root().join("firmware"))
         .env("CARGO_TARGET_DIR", firmware_target());

@@ -39,7 +39,7 @@ Shares with 95 % bounds.
 ";
 
 fn strangers(arguments: &[String]) -> Result<()> {
-    run(&mut cargo(&["build", "--release", "--package", "host-fit"]))?;
+    run(&mut cargo("build --release --package host-fit"))?;
     let rest: Vec<&String> = arguments.iter().filter(|a| *a != "--page").collect();
     if rest.len() == arguments.len() {
         return run(scenario("strangers").args(arguments));

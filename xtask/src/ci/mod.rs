@@ -15,6 +15,7 @@ pub(crate) const TASK: Task = Task {
 };
 
 /// A part of CI, which runs concurrently with others.
+#[derive(Clone, Copy)]
 struct Step {
     name: &'static str,
     /// Steps that must end before it starts; if one of them fails it is not run.
@@ -22,6 +23,28 @@ struct Step {
     /// A resource that no two steps use at the same time.
     room: Option<Room>,
     run: fn() -> Result<()>,
+}
+
+impl Step {
+    const fn new(name: &'static str, run: fn() -> Result<()>) -> Self {
+        Self {
+            name,
+            after: &[],
+            room: None,
+            run,
+        }
+    }
+
+    const fn after(self, after: &'static [&'static str]) -> Self {
+        Self { after, ..self }
+    }
+
+    const fn within(self, room: Room) -> Self {
+        Self {
+            room: Some(room),
+            ..self
+        }
+    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,242 +61,115 @@ const SET_UP: &str = "set-up";
 
 /// In the order in which they start if none has to wait.
 const STEPS: &[Step] = &[
-    Step {
-        name: BUILD,
-        after: &[],
-        room: Some(Room::Host),
-        run: || {
-            run(&mut cargo(&[
-                "test",
-                "--release",
-                "--workspace",
-                "--no-run",
-            ]))
-        },
-    },
-    Step {
-        name: "format",
-        after: &[],
-        room: None,
-        run: || {
-            run(&mut cargo(&["fmt", "--all", "--check"]))?;
-            run(&mut firmware_cargo(&["fmt", "--all", "--check"]))
-        },
-    },
-    Step {
-        name: SET_UP,
-        after: &[],
-        room: None,
-        run: || crate::setup::setup(&[]),
-    },
+    Step::new(BUILD, || {
+        run(&mut cargo("test --release --workspace --no-run"))
+    })
+    .within(Room::Host),
+    Step::new("format", || {
+        run(&mut cargo("fmt --all --check"))?;
+        run(&mut firmware_cargo("fmt --all --check"))
+    }),
+    Step::new(SET_UP, || crate::setup::setup(&[])),
     // The README's test command, including documentation examples. Everything is compiled before, so that the
     // folder is locked only briefly.
-    Step {
-        name: "tests",
-        after: &[BUILD],
-        room: None,
-        run: || run(&mut cargo(&["test", "--release", "--workspace"])),
-    },
+    Step::new("tests", || run(&mut cargo("test --release --workspace"))).after(&[BUILD]),
     // The bundle in reports equals the sources.
-    Step {
-        name: "pages",
-        after: &[SET_UP],
-        room: None,
-        run: || crate::pages::pages(&["--check".to_owned()]),
-    },
-    Step {
-        name: "browser",
-        after: &[BUILD, "pages"],
-        room: None,
-        run: || crate::browser::browser(&[]),
-    },
-    Step {
-        name: "lints",
-        after: &[],
-        room: Some(Room::Host),
-        run: || {
-            run(&mut cargo(&[
-                "clippy",
-                "--release",
-                "--workspace",
-                "--all-targets",
-                "--",
-                "-Dwarnings",
-            ]))
-        },
-    },
-    Step {
-        name: "documentation",
-        after: &[],
-        room: Some(Room::Host),
-        run: || {
-            run(cargo(&["doc", "--release", "--workspace", "--no-deps"])
-                .env("RUSTDOCFLAGS", "-Dwarnings"))
-        },
-    },
+    Step::new("pages", || crate::pages::pages(&["--check".to_owned()])).after(&[SET_UP]),
+    Step::new("browser", || crate::browser::browser(&[])).after(&[BUILD, "pages"]),
+    Step::new("lints", || {
+        run(&mut cargo(
+            "clippy --release --workspace --all-targets -- -Dwarnings",
+        ))
+    })
+    .within(Room::Host),
+    Step::new("documentation", || {
+        run(cargo("doc --release --workspace --no-deps").env("RUSTDOCFLAGS", "-Dwarnings"))
+    })
+    .within(Room::Host),
     // The emulated board, one step after the other: the longest chain, so it starts before steps that can run at the
     // same time.
-    Step {
-        name: "faults",
-        after: &[SET_UP, BUILD],
-        room: Some(Room::Firmware),
-        run: || crate::faults::faults(&[]),
-    },
+    Step::new("faults", || crate::faults::faults(&[]))
+        .after(&[SET_UP, BUILD])
+        .within(Room::Firmware),
     // Links only without panics; runs the constants; checks the budgets.
-    Step {
-        name: "pil",
-        after: &[SET_UP, BUILD],
-        room: Some(Room::Firmware),
-        run: crate::budgets::check,
-    },
+    Step::new("pil", crate::budgets::check)
+        .after(&[SET_UP, BUILD])
+        .within(Room::Firmware),
     // Lockstep at other periods, and the emulated board at one of them.
-    Step {
-        name: "periods",
-        after: &[SET_UP, BUILD],
-        room: Some(Room::Firmware),
-        run: || crate::periods::periods(&[]),
-    },
+    Step::new("periods", || crate::periods::periods(&[]))
+        .after(&[SET_UP, BUILD])
+        .within(Room::Firmware),
     // The complete workflow on the simulated rig, without a user.
-    Step {
-        name: "rig-day",
-        after: &[SET_UP, BUILD],
-        room: Some(Room::Firmware),
-        run: || crate::rig_day::rig_day(&["--brief".to_owned()]),
-    },
+    Step::new("rig-day", || {
+        crate::rig_day::rig_day(&["--brief".to_owned()])
+    })
+    .after(&[SET_UP, BUILD])
+    .within(Room::Firmware),
     // The whole workflow: the model found by the demo is built for the board and runs there.
-    Step {
-        name: "demo on board",
-        after: &[SET_UP, BUILD],
-        room: Some(Room::Firmware),
-        run: demo_on_board,
-    },
-    Step {
-        name: "msrv",
-        after: &[],
-        room: None,
-        run: crate::msrv::msrv,
-    },
-    Step {
-        name: "supply",
-        after: &[],
-        room: None,
-        run: crate::supply::supply,
-    },
+    Step::new("demo on board", demo_on_board)
+        .after(&[SET_UP, BUILD])
+        .within(Room::Firmware),
+    Step::new("msrv", crate::msrv::msrv),
+    Step::new("supply", crate::supply::supply),
     // Every crate can be published.
-    Step {
-        name: "package",
-        after: &[BUILD],
-        room: Some(Room::Host),
-        run: || (crate::package::TASK.run)(&[]),
-    },
+    Step::new("package", || (crate::package::TASK.run)(&[]))
+        .after(&[BUILD])
+        .within(Room::Host),
     // Archive and wheel for people without a compiler, installed in another folder.
-    Step {
-        name: "release",
-        after: &[SET_UP, BUILD],
-        room: None,
-        run: || crate::release::release(&[]),
-    },
+    Step::new("release", || crate::release::release(&[])).after(&[SET_UP, BUILD]),
     // An effect and a delay law need one file and one line each.
-    Step {
-        name: "new effect",
-        after: &[BUILD],
-        room: Some(Room::Host),
-        run: crate::new_effect::proof,
-    },
+    Step::new("new effect", crate::new_effect::proof)
+        .after(&[BUILD])
+        .within(Room::Host),
     // 10 s a target.
-    Step {
-        name: "fuzz",
-        after: &[BUILD],
-        room: None,
-        run: crate::fuzz::brief,
-    },
+    Step::new("fuzz", crate::fuzz::brief).after(&[BUILD]),
     // The generated pages equal the catalogue, and every link has a target.
-    Step {
-        name: "book",
-        after: &[BUILD],
-        room: None,
-        run: || crate::book::book(&["--check".to_owned()]),
-    },
-    Step {
-        name: "firmware lints",
-        after: &[],
-        room: Some(Room::Firmware),
-        run: || {
-            run(&mut firmware_cargo(&[
-                "clippy",
-                "--release",
-                "--all-targets",
-                "--package=firmware",
-                "--package=identified",
-                "--package=log-reader",
-                // With the test profile; otherwise every dependency would be checked once for tests and once for
-                // the rest.
-                "--config=profile.release.panic=\"unwind\"",
-                "--",
-                "-Dwarnings",
-            ]))
-        },
-    },
-    Step {
-        name: "firmware tests",
-        after: &[],
-        room: Some(Room::Firmware),
-        run: || run(&mut firmware_cargo(&["test", "--release"])),
-    },
-    Step {
-        name: "board lints",
-        after: &[SET_UP],
-        room: Some(Room::Firmware),
-        run: board_lints,
-    },
+    Step::new("book", || crate::book::book(&["--check".to_owned()])).after(&[BUILD]),
+    // With the test profile; otherwise every dependency would be checked once for tests and once for the rest.
+    Step::new("firmware lints", || {
+        run(&mut firmware_cargo(
+            "clippy --release --all-targets --package=firmware --package=identified \
+                --package=log-reader --config=profile.release.panic=\"unwind\" -- -Dwarnings",
+        ))
+    })
+    .within(Room::Firmware),
+    Step::new("firmware tests", || {
+        run(&mut firmware_cargo("test --release"))
+    })
+    .within(Room::Firmware),
+    Step::new("board lints", board_lints)
+        .after(&[SET_UP])
+        .within(Room::Firmware),
     // The loop and the model without board code, also for smaller and newer cores.
-    Step {
-        name: "no_std",
-        after: &[SET_UP],
-        room: Some(Room::Firmware),
-        run: || {
-            TARGETS
-                .iter()
-                .try_for_each(|target| crate::firmware::libraries(target))
-        },
-    },
+    Step::new("no_std", || {
+        TARGETS
+            .iter()
+            .try_for_each(|target| crate::firmware::libraries(target))
+    })
+    .after(&[SET_UP])
+    .within(Room::Firmware),
     // Link only without panics.
-    Step {
-        name: "boards",
-        after: &[SET_UP],
-        room: Some(Room::Firmware),
-        run: || {
-            for board in crate::firmware::BOARDS {
-                crate::firmware::firmware(&["--board".to_owned(), board.to_owned()])?;
-            }
-            crate::firmware::build("nucleo-f446re", "nucleo-pil", &[], None).map(|_| ())
-        },
-    },
-    Step {
-        name: "nucleo",
-        after: &[SET_UP],
-        room: Some(Room::Firmware),
-        run: crate::nucleo::nucleo,
-    },
+    Step::new("boards", || {
+        for board in crate::firmware::BOARDS {
+            crate::firmware::firmware(&["--board".to_owned(), board.to_owned()])?;
+        }
+        crate::firmware::build("nucleo-f446re", "nucleo-pil", &[], None).map(|_| ())
+    })
+    .after(&[SET_UP])
+    .within(Room::Firmware),
+    Step::new("nucleo", crate::nucleo::nucleo)
+        .after(&[SET_UP])
+        .within(Room::Firmware),
     // The exported models agree with the host.
-    Step {
-        name: "agreement",
-        after: &[SET_UP, BUILD],
-        room: None,
-        run: || (crate::agreement::TASK.run)(&["--all", "--in-turn"].map(str::to_owned)),
-    },
-    Step {
-        name: "examples",
-        after: &[SET_UP, BUILD],
-        room: None,
-        run: || (crate::examples::TASK.run)(&[]),
-    },
-    Step {
-        name: "constants",
-        after: &[BUILD],
-        room: None,
-        run: || crate::identified::identified(&["--check".to_owned()]),
-    },
+    Step::new("agreement", || {
+        (crate::agreement::TASK.run)(&["--all", "--in-turn"].map(str::to_owned))
+    })
+    .after(&[SET_UP, BUILD]),
+    Step::new("examples", || (crate::examples::TASK.run)(&[])).after(&[SET_UP, BUILD]),
+    Step::new("constants", || {
+        crate::identified::identified(&["--check".to_owned()])
+    })
+    .after(&[BUILD]),
 ];
 
 fn board_lints() -> Result<()> {

@@ -36,15 +36,10 @@ pub(crate) fn proof() -> Result<()> {
     let law = copy.join(MODEL).join("clamped_linear_delay.rs");
     fs::write(&law, include_str!("clamped_linear_delay.txt"))?;
 
-    run(cargo(&[
-        "test",
-        "--release",
-        "--package=model-core",
-        "--package=firmware-sim",
-        "--lib",
-        "effects",
-    ])
-    .in_copy(&copy))?;
+    run(
+        cargo("test --release --package=model-core --package=firmware-sim --lib effects")
+            .in_copy(&copy),
+    )?;
     let manifest = copy.join("host-fit/Cargo.toml");
     let mut text = fs::read_to_string(&manifest)?;
     write!(
@@ -52,15 +47,9 @@ pub(crate) fn proof() -> Result<()> {
         "\n[[bin]]\nname = \"{PROGRAM}\"\npath = \"src/main.rs\"\n"
     )?;
     fs::write(&manifest, text)?;
-    run(cargo(&[
-        "build",
-        "--release",
-        "--package",
-        "host-fit",
-        "--bin",
-        PROGRAM,
-    ])
-    .in_copy(&copy))?;
+    run(cargo("build --release --package host-fit --bin")
+        .arg(PROGRAM)
+        .in_copy(&copy))?;
     let tool = |arguments: &[&str]| -> Result<Value> {
         let program = target().join("release").join(PROGRAM);
         let mut command = std::process::Command::new(program);
@@ -91,7 +80,7 @@ pub(crate) fn proof() -> Result<()> {
         .display()
         .to_string();
     tool(&["codegen", &with_law, "-o", &constants])?;
-    run(cargo(&["check", "--release", "--package", "identified"]).in_copy(&copy))
+    run(cargo("check --release --package identified").in_copy(&copy))
 }
 
 /// Gives the packages of a workspace another version: cargo distinguishes build products by name and version,

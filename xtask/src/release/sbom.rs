@@ -71,13 +71,8 @@ pub(super) struct Parts {
 
 impl Parts {
     pub(super) fn new(triple: &str) -> Result<Self> {
-        let metadata = output(&mut cargo(&[
-            "metadata",
-            "--locked",
-            "--format-version=1",
-            "--filter-platform",
-            triple,
-        ]))?;
+        let metadata =
+            output(cargo("metadata --locked --format-version=1 --filter-platform").arg(triple))?;
         let read = |path: &str| std::fs::read_to_string(root().join(path)).context(path.to_owned());
         Ok(Self {
             metadata: serde_json::from_str(&metadata).context("cargo metadata")?,

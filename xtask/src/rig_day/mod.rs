@@ -31,9 +31,9 @@ struct Form {
     period: &'static str,
     repeats: &'static str,
     /// Additional options of the calibration.
-    calibration: &'static [&'static str],
+    calibration: &'static str,
     /// Additional options of the law's design.
-    design: &'static [&'static str],
+    design: &'static str,
     /// Duration of `watch`, and of its learning phase, s.
     watched: [&'static str; 2],
     /// Largest allowed ratio of the second law's rms error to the first's.
@@ -45,8 +45,8 @@ const LONG: Form = Form {
     validate: &["sq2-30", "random-b", "sq8-80"],
     period: "10",
     repeats: "8",
-    calibration: &[],
-    design: &[],
+    calibration: "",
+    design: "",
     watched: ["90", "30"],
     law: 1.0,
 };
@@ -64,18 +64,10 @@ const BRIEF: Form = Form {
     validate: &["random-b"],
     period: "5",
     repeats: "5",
-    calibration: &["--steady", "1.5", "--pulses", "8"],
+    calibration: "--steady 1.5 --pulses 8",
     // Trials of half the length, and a coarse robustness margin.
-    design: &[
-        "--set",
-        "design.trial=6000",
-        "--set",
-        "design.trial-from=2000",
-        "--set",
-        "design.margin-rays=4",
-        "--set",
-        "design.margin-bisections=2",
-    ],
+    design: "--set design.trial=6000 --set design.trial-from=2000 --set design.margin-rays=4 \
+        --set design.margin-bisections=2",
     watched: ["20", "8"],
     // Most of the error is the ripple of the shortest pulses, which a watch of this length measures to 3 %.
     law: 1.06,
@@ -139,85 +131,33 @@ pub(crate) fn rig_day(arguments: &[String]) -> Result<()> {
 
     day.say("## 1. Calibrate the rig\n\nThe bundled firmware contains neither a model nor the properties of the rig. `--calibrate` measures sensor scale, noise\nand shortest pulses.");
     day.firmware("first", None, false)?;
-    day.fit(
-        "calibrate",
-        &port(
-            "record",
-            "first",
-            &[&["--calibrate", "-o", "rig.toml"], *calibration].concat(),
-        ),
-    )?;
+    let calibrate = format!("--calibrate -o rig.toml {calibration}");
+    day.fit("calibrate", &port("record", "first", &calibrate))?;
 
     day.say("## 2. Record and average\n\nThe board plays each command from rest and streams every sample. `rig.toml` converts counts to y. The scatter between\nrepeats becomes `y_sd`, the noise level of every later comparison.");
-    let commands: Vec<String> = identify
-        .iter()
-        .chain(*validate)
-        .map(|n| format!("--command=commands/{n}.csv"))
-        .collect();
-    let mut line = port(
-        "record",
-        "first",
-        &["--rig", "rig.toml", "--repeats", repeats, "-o", "raw"],
-    );
-    line.extend(commands);
+    let names = || identify.iter().chain(*validate);
+    let rest = format!("--rig rig.toml --repeats {repeats} -o raw");
+    let mut line = port("record", "first", &rest);
+    line.extend(names().map(|n| format!("--command=commands/{n}.csv")));
     day.fit("record", &line)?;
     let played = played_period(&day.folder.join(format!("raw/{}.toml", identify[0])))?;
-    let mut line = words(&["average", "--period", &played, "--out", "set"]);
-    line.extend(
-        identify
-            .iter()
-            .chain(*validate)
-            .map(|n| format!("raw/{n}.csv")),
-    );
+    let mut line = words(&format!("average --period {played} --out set"));
+    line.extend(names().map(|n| format!("raw/{n}.csv")));
     line.extend(validate.iter().map(|n| format!("--validate={n}")));
     day.fit("average", &line)?;
 
     day.say("## 3. Identify and diagnose");
-    day.fit("identify", &words(&["identify", "set", "-o", "model.toml"]))?;
-    day.fit("compare", &words(&["compare", "model.toml", "set"]))?;
-    day.fit(
-        "diagnose",
-        &words(&[
-            "diagnose",
-            "model.toml",
-            "set",
-            "-o",
-            "better.toml",
-            "--experiment",
-            "experiment.csv",
-        ]),
-    )?;
+    day.fit("identify", &words("identify set -o model.toml"))?;
+    day.fit("compare", &words("compare model.toml set"))?;
+    let line = words("diagnose model.toml set -o better.toml --experiment experiment.csv");
+    day.fit("diagnose", &line)?;
     if day.folder.join("experiment.csv").exists() {
         day.say("Several effects are not distinguishable on these records. The command that distinguishes them is played, and the diagnosis\nrepeated.");
-        day.fit(
-            "record experiment",
-            &port(
-                "record",
-                "first",
-                &[
-                    "--rig",
-                    "rig.toml",
-                    "--repeats",
-                    repeats,
-                    "-o",
-                    "raw-2",
-                    "--command",
-                    "experiment.csv",
-                ],
-            ),
-        )?;
+        let rest = format!("--rig rig.toml --repeats {repeats} -o raw-2 --command experiment.csv");
+        day.fit("record experiment", &port("record", "first", &rest))?;
         let period = played_period(&day.folder.join("raw-2/experiment.toml"))?;
-        day.fit(
-            "average experiment",
-            &words(&[
-                "average",
-                "raw-2/experiment.csv",
-                "--period",
-                &period,
-                "--out",
-                "set-2",
-            ]),
-        )?;
+        let line = format!("average raw-2/experiment.csv --period {period} --out set-2");
+        day.fit("average experiment", &words(&line))?;
         std::fs::copy(
             day.folder.join("set-2/experiment.csv"),
             day.folder.join("set/experiment.csv"),
@@ -226,78 +166,35 @@ pub(crate) fn rig_day(arguments: &[String]) -> Result<()> {
         let text = std::fs::read_to_string(&list)?
             + "\n[[record]]\nname = \"experiment\"\nfile = \"experiment.csv\"\nuse = \"identify\"\n";
         std::fs::write(&list, text)?;
-        day.fit(
-            "diagnose again",
-            &words(&["diagnose", "model.toml", "set", "-o", "better.toml"]),
-        )?;
+        let line = words("diagnose model.toml set -o better.toml");
+        day.fit("diagnose again", &line)?;
     }
-    let better = day.fit(
-        "compare",
-        &words(&["compare", "better.toml", "set", "--json"]),
-    )?;
+    let better = day.fit("compare", &words("compare better.toml set --json"))?;
     let effects = effects(&day.folder.join("better.toml"))?;
     for model in ["model", "better"] {
-        let (model, run) = (format!("{model}.toml"), format!("{model}-run.csv"));
-        let record = format!("set/{}.csv", validate[0]);
-        day.quietly(&words(&["simulate", &model, &record, "-o", &run]))?;
+        let record = validate[0];
+        let line = format!("simulate {model}.toml set/{record}.csv -o {model}-run.csv");
+        day.quietly(&words(&line))?;
     }
 
     day.say("## 4. Design a law with each model\n\nBoth models get a law for the same target. Each law is tried in simulation on its model and on every plant that the\nrecords do not exclude; losing attachment there rejects the law. Stress trials only warn. The firmware is built from model\nand rig file, and a rig file that contradicts the model is refused.");
     let mut rms = Vec::new();
     for (name, model) in [("before", "model.toml"), ("after", "better.toml")] {
         let controlled = format!("{name}.toml");
-        day.fit(
-            &format!("design {name}"),
-            &words(
-                &[
-                    &[
-                        "design",
-                        model,
-                        "set",
-                        "-o",
-                        &controlled,
-                        "--target",
-                        TARGET,
-                        "--min-on",
-                        "0.02",
-                        "--min-off",
-                        "0.02",
-                        "--rig",
-                        "rig.toml",
-                    ],
-                    *design,
-                ]
-                .concat(),
-            ),
-        )?;
+        let line = format!(
+            "design {model} set -o {controlled} --target {TARGET} --min-on 0.02 --min-off 0.02 --rig rig.toml {design}"
+        );
+        day.fit(&format!("design {name}"), &words(&line))?;
         day.firmware(name, Some(&controlled), true)?;
-        let log = format!("service-{name}");
-        let said = day.fit(
-            &format!("watch {name}"),
-            &port(
-                "watch",
-                name,
-                &[
-                    "--arm",
-                    "--seconds",
-                    seconds,
-                    "--learn",
-                    learn,
-                    "--rig",
-                    "rig.toml",
-                    "-o",
-                    &log,
-                ],
-            ),
-        )?;
+        let rest =
+            format!("--arm --seconds {seconds} --learn {learn} --rig rig.toml -o service-{name}");
+        let said = day.fit(&format!("watch {name}"), &port("watch", name, &rest))?;
         rms.push((number(&said, "rms error ")?, number(&said, "air ")?));
     }
 
     day.say("## 5. Check the model in operation\n\nThe log of the closed loop is a data set: `compare` validates the model on it.");
-    day.fit(
-        "compare in service",
-        &words(&["compare", "better.toml", "service-after"]),
-    )?;
+    let line = words("compare better.toml service-after");
+    day.fit("compare in service", &line)?;
 
     let (held_out, noise) = held_out(&better)?;
     let ((before, air_before), (after, air_after)) = (rms[0], rms[1]);
@@ -370,16 +267,15 @@ fn cut(text: &str, samples: usize) -> String {
     cut
 }
 
-fn words(line: &[&str]) -> Vec<String> {
-    line.iter().map(|word| (*word).to_owned()).collect()
+fn words(line: &str) -> Vec<String> {
+    line.split_whitespace().map(str::to_owned).collect()
 }
 
 /// A command at the simulated rig, with the program that the board runs.
-fn port(command: &str, elf: &str, rest: &[&str]) -> Vec<String> {
-    let mut line = words(&[command, "--port", "qemu", "--firmware", elf]);
-    line.extend(words(&["--rig-seed", RIG, "--rig-effect", HIDDEN]));
-    line.extend(words(rest));
-    line
+fn port(command: &str, elf: &str, rest: &str) -> Vec<String> {
+    words(&format!(
+        "{command} --port qemu --firmware {elf} --rig-seed {RIG} --rig-effect {HIDDEN} {rest}"
+    ))
 }
 
 impl Day {

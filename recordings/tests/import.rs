@@ -34,6 +34,12 @@ fn some(name: &str) -> Option<String> {
     Some(name.to_owned())
 }
 
+fn with(change: impl FnOnce(&mut Mapping)) -> Mapping {
+    let mut mapping = Mapping::default();
+    change(&mut mapping);
+    mapping
+}
+
 fn imported(name: &str, mapping: &Mapping) -> Imported {
     let request = Import {
         mapping: mapping.clone(),
@@ -59,10 +65,7 @@ fn shear(k: usize) -> f64 {
 
 #[test]
 fn every_format_gives_the_same_record() {
-    let on_off = Mapping {
-        u_threshold: Some(2.5),
-        ..Mapping::default()
-    };
+    let on_off = with(|m| m.u_threshold = Some(2.5));
     let columns = |u: &str, y: &str, t: &str| Mapping {
         t: some(t),
         u: some(u),
@@ -137,11 +140,9 @@ fn integers_scales_and_stated_rates_are_understood() {
     assert!(single.files[0].remarks.join("\n").contains("`objects`"));
 
     for name in ["small-le.mat", "small-be.mat"] {
-        let mapping = Mapping {
-            period_s: Some(0.5),
-            ..Mapping::default()
-        };
-        let record = &imported(name, &mapping).set.records[0];
+        let record = &imported(name, &with(|m| m.period_s = Some(0.5)))
+            .set
+            .records[0];
         assert_eq!((record.y[39], record.u[39]), (39.0, 1.0), "{name}");
     }
 }
@@ -151,10 +152,7 @@ fn the_folder_loads_and_keeps_the_mapping() {
     let folder = tempfile::tempdir().unwrap();
     let target = folder.path().join("set");
     let request = Import {
-        mapping: Mapping {
-            u_threshold: Some(2.5),
-            ..Mapping::default()
-        },
+        mapping: with(|m| m.u_threshold = Some(2.5)),
         title: some("Ramp"),
         hold_out_from_s: Some(0.03),
         ..Import::default()
@@ -194,11 +192,6 @@ fn the_folder_loads_and_keeps_the_mapping() {
 
 #[test]
 fn faults_name_the_variable_and_the_remedy() {
-    let with = |change: fn(&mut Mapping)| {
-        let mut mapping = Mapping::default();
-        change(&mut mapping);
-        mapping
-    };
     for (name, mapping, parts) in [
         (
             "v7.mat",

@@ -19,6 +19,13 @@ fn read(files: &[PathBuf], request: &Import) -> Imported {
     import(&files, request).unwrap_or_else(|e| panic!("{e}"))
 }
 
+/// An import with changes of the mapping.
+fn with(change: impl FnOnce(&mut Mapping)) -> Import {
+    let mut request = Import::default();
+    change(&mut request.mapping);
+    request
+}
+
 /// A file with this text, imported.
 fn text(name: &str, content: &str, request: &Import) -> Result<Imported, String> {
     let folder = tempfile::tempdir().unwrap();
@@ -212,16 +219,9 @@ fn rounded_stamps_miss_no_sample() {
         "{remarks}"
     );
     for period in [1.0, 1.0017] {
-        let mapping = Mapping {
-            period_s: Some(period),
-            ..Mapping::default()
-        };
         let found = read(
             &[stranger("rounded-clock/log.csv")],
-            &Import {
-                mapping,
-                ..Import::default()
-            },
+            &with(|m| m.period_s = Some(period)),
         );
         assert_eq!(found.set.sample_period_s, period);
         assert!(found.set.records[0].channels.is_empty());
@@ -262,17 +262,7 @@ fn clocks_that_agree_within_a_sample_make_one_set() {
     found.save(&folder.path().join("set")).unwrap();
     let set = DataSet::load(&folder.path().join("set")).unwrap();
     assert_eq!(set.hash, found.set.hash);
-    let mapping = Mapping {
-        period_s: Some(0.9904),
-        ..Mapping::default()
-    };
-    let stated = read(
-        &days,
-        &Import {
-            mapping,
-            ..Import::default()
-        },
-    );
+    let stated = read(&days, &with(|m| m.period_s = Some(0.9904)));
     assert_eq!(stated.set.sample_period_s, 0.9904);
 
     // A period that was estimated is not called stated.
@@ -290,34 +280,19 @@ fn clocks_that_agree_within_a_sample_make_one_set() {
         error.contains("is 1 s, that of record `slow` is 2 s") && error.contains("resample"),
         "{error}"
     );
-    let mapping = Mapping {
-        period_s: Some(2.0),
-        ..Mapping::default()
-    };
-    let error = import(
-        &[&fast],
-        &Import {
-            mapping,
-            ..Import::default()
-        },
-    )
-    .unwrap_err()
-    .to_string();
+    let error = import(&[&fast], &with(|m| m.period_s = Some(2.0)))
+        .unwrap_err()
+        .to_string();
     assert!(
         error.contains("1 s apart by their times, but --period is 2 s"),
         "{error}"
     );
-    let mapping = Mapping {
-        period_s: Some(2.0),
-        ignore_time: true,
-        ..Mapping::default()
-    };
     let found = import(
         &[&fast],
-        &Import {
-            mapping,
-            ..Import::default()
-        },
+        &with(|m| {
+            m.period_s = Some(2.0);
+            m.ignore_time = true;
+        }),
     )
     .unwrap();
     assert_eq!(found.set.sample_period_s, 2.0);
@@ -374,15 +349,10 @@ fn with_rows(instead: &[(usize, &str)]) -> String {
 #[test]
 fn short_gaps_are_filled_and_long_ones_named() {
     let filled = |fill_gaps_s: f64, instead: &[(usize, &str)]| {
-        let mapping = Mapping {
-            fill_gaps_s: Some(fill_gaps_s),
-            channels: Some(vec!["fan".to_owned()]),
-            ..Mapping::default()
-        };
-        let request = Import {
-            mapping,
-            ..Import::default()
-        };
+        let request = with(|m| {
+            m.fill_gaps_s = Some(fill_gaps_s);
+            m.channels = Some(vec!["fan".to_owned()]);
+        });
         text("run.csv", &with_rows(instead), &request)
     };
     let whole = filled(0.3, &[]).unwrap();
@@ -471,12 +441,8 @@ fn a_command_may_be_graded_held_or_in_percent() {
         "run.csv",
         "t,u,y\n0,0 %,21\n1,45 %,21\n2,45 %,22\n",
         &Import {
-            mapping: Mapping {
-                u_scale: Some(1.0),
-                ..Mapping::default()
-            },
             u_before: Some(0.0),
-            ..Import::default()
+            ..with(|m| m.u_scale = Some(1.0))
         },
     );
     let kept = kept.unwrap();

@@ -88,23 +88,23 @@ impl Mapping {
         file: &FilePlace,
         remarks: &mut Vec<String>,
     ) -> Result<(&'a Variable, &'a Variable), DataError> {
-        let named = |wanted: &Option<String>, known: &[&str]| match wanted {
+        let named = |wanted: &Option<String>, known: &str| match wanted {
             Some(name) => find(source, name, file).map(Some),
             None => known_as(source, known, file),
         };
         // A variable with another known role is not a candidate.
         let time = match &self.t {
             Some(name) => source.get(name),
-            None => known_as(source, &TIMES, &FilePlace::default())
+            None => known_as(source, TIMES, &FilePlace::default())
                 .ok()
                 .flatten(),
         };
-        let is_controlled = known_as(source, &PROCESS_VALUES, file)?.is_some();
-        let mut u = named(&self.u, &COMMANDS)?;
+        let is_controlled = known_as(source, PROCESS_VALUES, file)?.is_some();
+        let mut u = named(&self.u, COMMANDS)?;
         if u.is_none() && is_controlled {
-            u = known_as(source, &CONTROLLER_OUTPUTS, file)?;
+            u = known_as(source, CONTROLLER_OUTPUTS, file)?;
         }
-        let y = named(&self.y, &OUTPUTS)?;
+        let y = named(&self.y, OUTPUTS)?;
         let which = |what, option| {
             let found = source.listed();
             let problem = ImportProblem::Which {

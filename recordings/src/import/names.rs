@@ -5,102 +5,26 @@ use super::problem::ImportProblem;
 use super::source::{Source, Variable};
 use crate::error::{DataError, FilePlace};
 
-/// Usual names of the time.
-pub(super) const TIMES: [&str; 44] = [
-    "t",
-    "time",
-    "zeit",
-    "temps",
-    "tout",
-    "x_value",
-    "time_s",
-    "t_s",
-    "sec",
-    "secs",
-    "seconds",
-    "elapsed",
-    "elapsed_s",
-    "elapsed_time",
-    "time_ms",
-    "t_ms",
-    "elapsed_ms",
-    "millis",
-    "milliseconds",
-    "ms",
-    "time_us",
-    "t_us",
-    "micros",
-    "microseconds",
-    "us",
-    "time_min",
-    "t_min",
-    "timestamp",
-    "timestamps",
-    "time_stamp",
-    "timestamp_ms",
-    "timestamp_us",
-    "datetime",
-    "date_time",
-    "date_and_time",
-    "zeitstempel",
-    "epoch",
-    "unixtime",
-    "unix_time",
-    "clock",
-    "uhrzeit",
-    "date",
-    "datum",
-    "received",
-];
+/// Usual names of the time; these lists are in the order of priority.
+pub(super) const TIMES: &str = "t time zeit temps tout x_value time_s t_s sec secs seconds elapsed elapsed_s elapsed_time \
+    time_ms t_ms elapsed_ms millis milliseconds ms time_us t_us micros microseconds us \
+    time_min t_min timestamp timestamps time_stamp timestamp_ms timestamp_us datetime \
+    date_time date_and_time zeitstempel epoch unixtime unix_time clock uhrzeit date datum \
+    received";
 
 /// Usual names of the command.
-pub(super) const COMMANDS: [&str; 20] = [
-    "u",
-    "input",
-    "command",
-    "valve",
-    "actuator",
-    "ventil",
-    "cmd",
-    "stell",
-    "heater",
-    "heizung",
-    "pwm",
-    "duty",
-    "duty_cycle",
-    "relay",
-    "switch",
-    "pump",
-    "fan",
-    "controller_output",
-    "co",
-    "control",
-];
+pub(super) const COMMANDS: &str = "u input command valve actuator ventil cmd stell heater heizung pwm duty duty_cycle relay \
+    switch pump fan controller_output co control";
 
 /// Names that mean the command if the file has a process value, and the output of the rig otherwise.
-pub(super) const CONTROLLER_OUTPUTS: [&str; 4] = ["out", "output", "op", "mv"];
+pub(super) const CONTROLLER_OUTPUTS: &str = "out output op mv";
 
 /// Names of the output that a controller measures.
-pub(super) const PROCESS_VALUES: [&str; 3] = ["pv", "process_value", "process_variable"];
+pub(super) const PROCESS_VALUES: &str = "pv process_value process_variable";
 
 /// Usual names of the output.
-pub(super) const OUTPUTS: [&str; 15] = [
-    "y",
-    "pv",
-    "process_value",
-    "process_variable",
-    "output",
-    "shear",
-    "friction",
-    "sensor",
-    "response",
-    "temperature",
-    "temperatur",
-    "temp",
-    "reading",
-    "measurement",
-    "measured",
-];
+pub(super) const OUTPUTS: &str = "y pv process_value process_variable output shear friction sensor response temperature \
+    temperatur temp reading measurement measured";
 
 /// The name after its last point, in the form of the lists.
 fn usual(name: &str) -> String {
@@ -138,23 +62,21 @@ pub(super) fn is_in_percent(name: &str) -> bool {
 /// An unreadable cell in the column of that name, in `file`.
 pub(super) fn known_as<'a>(
     source: &'a Source,
-    known: &[&str],
+    known: &str,
     file: &FilePlace,
 ) -> Result<Option<&'a Variable>, DataError> {
     let exact: fn(&str) -> String = usual;
-    for (name, by) in known
-        .iter()
-        .map(|n| (n, exact))
-        .chain(known.iter().map(|n| (n, stem as _)))
-    {
-        let is_it = |v: &&Variable| v.values.len() > 1 && by(&v.name) == *name;
+    let names = || known.split_whitespace();
+    let exactly = names().map(|name| (name, exact));
+    for (name, by) in exactly.chain(names().map(|name| (name, stem as _))) {
+        let is_it = |v: &&Variable| v.values.len() > 1 && by(&v.name) == name;
         let mut found = source.variables.iter().filter(is_it);
         match (found.next(), found.next()) {
             (Some(one), None) => return Ok(Some(one)),
             (Some(_), Some(_)) => continue,
             (None, _) => {}
         }
-        if let Some(unread) = source.unread.iter().find(|u| by(&u.name) == *name) {
+        if let Some(unread) = source.unread.iter().find(|u| by(&u.name) == name) {
             return Err(unread.error(file));
         }
     }

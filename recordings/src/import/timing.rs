@@ -163,7 +163,7 @@ impl Mapping {
         if let Some(name) = &self.t {
             return find(source, name, file).map(Some);
         }
-        if let Some(known) = known_as(source, &TIMES, file)? {
+        if let Some(known) = known_as(source, TIMES, file)? {
             return Ok(Some(known).filter(|t| t.values.len() == n));
         }
         let stamps = |kind: Kind| {
@@ -176,7 +176,11 @@ impl Mapping {
     }
 
     fn is_ignored(&self, variable: &Variable) -> bool {
-        let is_time = |name: &str| TIMES.iter().any(|t| t.eq_ignore_ascii_case(name));
+        let is_time = |name: &str| {
+            TIMES
+                .split_whitespace()
+                .any(|t| t.eq_ignore_ascii_case(name))
+        };
         self.ignore_time
             && (variable.stamped.is_some()
                 || self.t.as_ref().is_some_and(|t| *t == variable.name)

@@ -29,20 +29,10 @@ pub(crate) fn comparison(
 ) -> String {
     let mut report = Report::new("Comparison", title(set));
     let records = model.targets(&set.records);
-    let runs: [(&str, &[Vec<f64>]); 1] = [("model", &found.runs)];
-    let worst = lead(&mut report, &found.answer, None, &records, &runs);
-    report_failures(&mut report, &found.failures);
-    let samples = found
-        .failures
-        .samples(&records, &found.runs, model.longest_delay());
-    let lit = Some((&found.failures, samples.as_slice()));
-    report_runs(&mut report, &records, &runs, lit, worst);
-    let runs = &found.runs;
-    let label = "model";
-    checks(&mut report, &records, &[Run { label, model, runs }]);
-    report.section("Every record");
-    report.paragraph(&describe(model));
-    report_scores(&mut report, &found.scores);
+    let runs = [run("model", model, &found.runs)];
+    let worst = lead(&mut report, &found.answer, None, &records, &pairs(&runs));
+    compared(&mut report, &records, &runs, found, worst);
+    every_record(&mut report, model, &found.scores);
     provenance(&mut report, set, model.training.seed, command);
     report.html()
 }
@@ -55,15 +45,15 @@ pub(crate) fn side_by_side(
     command: &str,
 ) -> String {
     let mut report = Report::new("Comparison of models", title(set));
-    let labelled = found.models.iter();
-    let runs: Vec<(&str, &[Vec<f64>])> = labelled
-        .map(|named| (named.model.as_str(), named.comparison.runs.as_slice()))
+    let named = models.iter().zip(&found.models);
+    let runs: Vec<Run<'_>> = named
+        .map(|((_, model), named)| run(&named.model, model, &named.comparison.runs))
         .collect();
     let records = models
         .first()
         .map(|(_, model)| model.targets(&set.records))
         .unwrap_or_default();
-    let worst = lead(&mut report, &found.answer, None, &records, &runs);
+    let worst = lead(&mut report, &found.answer, None, &records, &pairs(&runs));
     let [first, rest @ ..] = SIDE_BY_SIDE;
     let columns = std::iter::once(Column::Text(first)).chain(rest.map(Column::Number));
     report.table(
@@ -71,13 +61,8 @@ pub(crate) fn side_by_side(
         &columns.collect::<Vec<_>>(),
         &side_by_side_rows(found),
     );
-    report_runs(&mut report, &records, &runs, None, worst);
-    let tested: Vec<Run<'_>> = models
-        .iter()
-        .zip(&runs)
-        .map(|((label, model), (_, runs))| Run { label, model, runs })
-        .collect();
-    checks(&mut report, &records, &tested);
+    report_runs(&mut report, &records, &pairs(&runs), None, worst);
+    checks(&mut report, &records, &runs);
     for ((name, model), named) in models.iter().zip(&found.models) {
         report.section(name);
         report.paragraph(&describe(model));
@@ -90,12 +75,12 @@ pub(crate) fn side_by_side(
 }
 
 /// The page of an identification.
-pub(crate) fn identification(set: &DataSet, found: &Identification, run: &Comparison) -> String {
+pub(crate) fn identification(set: &DataSet, found: &Identification, ran: &Comparison) -> String {
     let model = &found.model;
     let mut report = Report::new("Identification", title(set));
     let records = model.targets(&set.records);
-    let runs: [(&str, &[Vec<f64>]); 1] = [("model", &run.runs)];
-    let worst = lead(&mut report, &found.answer, None, &records, &runs);
+    let runs = [run("model", model, &ran.runs)];
+    let worst = lead(&mut report, &found.answer, None, &records, &pairs(&runs));
     report.section("The model");
     report.paragraph(&describe(model));
     if !found.remarks.is_empty() {
@@ -105,15 +90,7 @@ pub(crate) fn identification(set: &DataSet, found: &Identification, run: &Compar
         report.section("Excitation");
         report.list(&found.excitation);
     }
-    report_failures(&mut report, &run.failures);
-    let samples = run
-        .failures
-        .samples(&records, &run.runs, model.longest_delay());
-    let lit = Some((&run.failures, samples.as_slice()));
-    report_runs(&mut report, &records, &runs, lit, worst);
-    let label = "model";
-    let runs = &run.runs;
-    checks(&mut report, &records, &[Run { label, model, runs }]);
+    compared(&mut report, &records, &runs, ran, worst);
     report.section("Every record");
     report_scores(&mut report, &found.scores);
     provenance(&mut report, set, model.training.seed, &command_line());
@@ -131,33 +108,49 @@ pub(crate) fn extension(
     let (given, before) = given;
     let mut report = Report::new("Extension", title(set));
     let records = model.targets(&set.records);
-    let mut runs: Vec<(&str, &[Vec<f64>])> = Vec::new();
-    runs.extend(before.map(|run| ("before", run.runs.as_slice())));
-    runs.push(("after", &after.runs));
-    let worst = lead(&mut report, &found.answer, None, &records, &runs);
-    report_failures(&mut report, &after.failures);
-    let samples = after
-        .failures
-        .samples(&records, &after.runs, model.longest_delay());
-    let lit = Some((&after.failures, samples.as_slice()));
-    report_runs(&mut report, &records, &runs, lit, worst);
-    let mut tested = Vec::new();
-    tested.extend(before.map(|run| Run {
-        label: "before",
-        model: given,
-        runs: &run.runs,
-    }));
-    tested.push(Run {
-        label: "after",
-        model,
-        runs: &after.runs,
-    });
-    checks(&mut report, &records, &tested);
-    report.section("Every record");
-    report.paragraph(&describe(model));
-    report_scores(&mut report, &after.scores);
+    let before = before.map(|ran| run("before", given, &ran.runs));
+    let runs: Vec<Run<'_>> = before
+        .into_iter()
+        .chain([run("after", model, &after.runs)])
+        .collect();
+    let worst = lead(&mut report, &found.answer, None, &records, &pairs(&runs));
+    compared(&mut report, &records, &runs, after, worst);
+    every_record(&mut report, model, &after.scores);
     provenance(&mut report, set, model.training.seed, &command_line());
     report.html()
+}
+
+fn run<'a>(label: &'a str, model: &'a Model, runs: &'a [Vec<f64>]) -> Run<'a> {
+    Run { label, model, runs }
+}
+
+/// Label and free runs of each model.
+fn pairs<'a>(runs: &[Run<'a>]) -> Vec<(&'a str, &'a [Vec<f64>])> {
+    runs.iter().map(|run| (run.label, run.runs)).collect()
+}
+
+/// Where the last of `runs`, which `found` has compared, fails; all runs record by record, and their residual tests.
+fn compared(
+    report: &mut Report,
+    records: &[Record],
+    runs: &[Run<'_>],
+    found: &Comparison,
+    worst: Option<Stretch>,
+) {
+    let failures = &found.failures;
+    report_failures(report, failures);
+    let delay = runs.last().map_or(0, |run| run.model.longest_delay());
+    let samples = failures.samples(records, &found.runs, delay);
+    let lit = Some((failures, samples.as_slice()));
+    report_runs(report, records, &pairs(runs), lit, worst);
+    checks(report, records, runs);
+}
+
+/// The model and its indicators on every record.
+fn every_record(report: &mut Report, model: &Model, scores: &Scores) {
+    report.section("Every record");
+    report.paragraph(&describe(model));
+    report_scores(report, scores);
 }
 
 /// The page of a diagnosis of `given`.
@@ -225,23 +218,16 @@ pub(crate) fn finding_details(
         Some((failures, samples.as_slice())),
         worst,
     );
-    let mut tested = Vec::new();
-    tested.extend(found.runs_before.as_deref().map(|runs| Run {
-        label: "as given",
-        model: given,
-        runs,
-    }));
+    let given_runs = found.runs_before.as_deref();
+    let mut tested: Vec<Run<'_>> = given_runs
+        .map(|runs| run("as given", given, runs))
+        .into_iter()
+        .collect();
     if found.model != *given {
-        tested.push(Run {
-            label: after_label(found),
-            model: &found.model,
-            runs,
-        });
+        tested.push(run(after_label(found), &found.model, runs));
     }
     checks(report, &records, &tested);
-    report.section("Every record");
-    report.paragraph(&describe(&found.model));
-    report_scores(report, &found.scores);
+    every_record(report, &found.model, &found.scores);
 }
 
 /// The page of a discovery for `given`.
@@ -313,12 +299,10 @@ pub(crate) fn discovery_details(
     let tested: Vec<Run<'_>> = runs
         .iter()
         .zip(&models[first..])
-        .map(|((label, runs), model)| Run { label, model, runs })
+        .map(|((label, runs), model)| run(label, model, runs))
         .collect();
     checks(report, records, &tested);
-    report.section("Every record");
-    report.paragraph(&describe(&found.model));
-    report_scores(report, &found.scores);
+    every_record(report, &found.model, &found.scores);
 }
 
 /// The first screen of a page: the answer with a picture, and the interval with the largest error of the
@@ -423,6 +407,7 @@ fn report_trace(report: &mut Report, trace: &Trace) {
             })
             .collect();
         let picture = curve(&CurvePlot {
+            title: "",
             x_label: "time in record (s)",
             y_label: &format!(
                 "{} ({})",
@@ -430,7 +415,6 @@ fn report_trace(report: &mut Report, trace: &Trace) {
                 entry.unit().symbol()
             ),
             points: &points,
-            ..CurvePlot::default()
         });
         report.figure(&picture, &format!("{}: {}.", record.name, entry.words()));
     }
@@ -458,7 +442,6 @@ pub(super) fn term_picture(term: &FoundTerm) -> Picture {
             term.unit
         ),
         points: &points,
-        ..CurvePlot::default()
     })
 }
 

@@ -3,7 +3,7 @@
 use super::axis::{Axis, extent};
 use super::canvas::{Ink, MARGIN, Picture, draw};
 use super::legend::{Swatch, heading, nothing};
-use super::palette::{BLUE, INK, MUTED};
+use super::palette::{BLUE, MUTED};
 use super::panel::{FOOT, Panel, left_edge};
 
 /// A point of a curve. NaN limits draw no band.
@@ -30,16 +30,12 @@ pub struct CurvePlot<'a> {
     pub y_label: &'a str,
     /// The curve on ascending coordinates.
     pub points: &'a [BandPoint],
-    /// A formula for the curve on ascending coordinates: x and value; empty for none.
-    pub formula: &'a [(f64, f64)],
-    /// Label of the formula in the legend.
-    pub formula_label: &'a str,
 }
 
 /// Largest number of points drawn.
 const MOST_POINTS: usize = 400;
 
-/// Draws a curve with its confidence band, and its formula. Returns SVG.
+/// Draws a curve with its confidence band. Returns SVG.
 #[must_use]
 pub fn curve(plot: &CurvePlot<'_>) -> Picture {
     let description = format!("{}: {} against {}", plot.title, plot.y_label, plot.x_label);
@@ -48,27 +44,18 @@ pub fn curve(plot: &CurvePlot<'_>) -> Picture {
         let thin = plot.points.len().div_ceil(MOST_POINTS).max(1);
         let points: Vec<&BandPoint> = plot.points.iter().step_by(thin).collect();
         let values = points.iter().map(|p| p.value);
-        let formula = plot.formula.iter().map(|p| p.1);
-        let Some(shown) = extent(values.chain(formula)) else {
+        let Some(shown) = extent(values) else {
             return nothing(canvas, plot.title, "There is no curve.");
         };
-        let mut entries = vec![
+        let entries = [
             (Swatch::Line(BLUE), "curve".to_owned()),
             (Swatch::Band(MUTED), "95 % confidence".to_owned()),
         ];
-        if !plot.formula.is_empty() {
-            entries.push((Swatch::Line(INK), plot.formula_label.to_owned()));
-        }
         let top = heading(canvas, plot.title, &entries);
         // A wide band at poorly determined points must not flatten the curve.
         let y = Axis::padded(Some(shown), 0.35);
         let left = left_edge([&y]);
-        let x = extent(
-            points
-                .iter()
-                .map(|p| p.x)
-                .chain(plot.formula.iter().map(|p| p.0)),
-        );
+        let x = extent(points.iter().map(|p| p.x));
         let panel = Panel {
             left,
             top,
@@ -98,7 +85,6 @@ pub fn curve(plot: &CurvePlot<'_>) -> Picture {
                 canvas.dot(at, 3.5, Ink::new(BLUE, 1.0), true);
             }
         }
-        panel.curve(canvas, plot.formula.iter().copied(), Ink::new(INK, 1.75));
         panel.foot(canvas, plot.x_label);
         panel.bottom() + FOOT
     })

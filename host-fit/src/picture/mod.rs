@@ -39,7 +39,7 @@ pub use living::{Living, Stretches, packed};
 pub use overlay::{LabelledRun, Overlay, overlay};
 pub use ranking::{Candidate, Ranking, ranking};
 pub use region::{Region, Regions, regions};
-pub use report::{Column, KeyNumber, Report, Tone, workbench_page};
+pub use report::{Column, Report, Tone, workbench_page};
 pub use where_it_fails::{FailureBin, FailureView, WhereItFails, where_it_fails};
 
 #[cfg(test)]

@@ -18,33 +18,6 @@ pub enum Tone {
     Warning,
 }
 
-/// A number in a tile.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct KeyNumber {
-    /// Label of the figure, for example `"Validation FIT"`.
-    pub label: String,
-    /// The number with its unit, as text.
-    pub value: String,
-    /// A short comparison; empty for none.
-    pub note: String,
-}
-
-impl KeyNumber {
-    /// A tile with `label`, `value` and `note`.
-    #[must_use]
-    pub fn new(
-        label: impl Into<String>,
-        value: impl Into<String>,
-        note: impl Into<String>,
-    ) -> Self {
-        Self {
-            label: label.into(),
-            value: value.into(),
-            note: note.into(),
-        }
-    }
-}
-
 /// A column of a table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Column<'a> {
@@ -193,23 +166,6 @@ impl Report {
             self.push(format_args!("<li>{}</li>", inline(point.as_ref())));
         }
         self.push(format_args!("</ul>\n"))
-    }
-
-    /// Tiles with the numbers that matter.
-    pub fn key_numbers(&mut self, numbers: &[KeyNumber]) -> &mut Self {
-        self.push(format_args!("<dl class=\"numbers\">"));
-        for KeyNumber { label, value, note } in numbers {
-            self.push(format_args!(
-                "<div><dt>{}</dt><dd>{}</dd>",
-                inline(label),
-                inline(value)
-            ));
-            if !note.is_empty() {
-                self.push(format_args!("<dd class=\"note\">{}</dd>", inline(note)));
-            }
-            self.push(format_args!("</div>"));
-        }
-        self.push(format_args!("</dl>\n"))
     }
 
     /// A table with a caption (empty for none). Rows may be shorter than `columns`;
@@ -436,11 +392,6 @@ section{scroll-margin-top:8px}\
 .columns>figure,.cell>figure{margin:8px 0}\
 @media(max-width:1050px){.listed{display:block}.listed>nav{position:static;padding:0}.listed>nav ul{flex-direction:row;margin:1em 0}}\
 .good{--tone:var(--good)}.finding{--tone:var(--finding)}.warning{--tone:var(--warning)}\
-.numbers{display:grid;grid-template-columns:repeat(auto-fit,minmax(150px,1fr));gap:10px;margin:18px 0}\
-.numbers div{border:1px solid var(--rule);border-radius:6px;padding:10px 14px}\
-.numbers dt{color:var(--muted);font-size:.85rem}\
-.numbers dd{margin:0;font-size:1.4rem;font-weight:600;font-variant-numeric:tabular-nums}\
-.numbers dd.note{font-size:.85rem;font-weight:400;color:var(--muted)}\
 .table{overflow-x:auto;margin:14px 0}\
 table{border-collapse:collapse;font-size:.94rem;font-variant-numeric:tabular-nums}\
 .caption{color:var(--muted);font-size:.94rem;margin-bottom:0}\
@@ -460,7 +411,7 @@ footer dd{margin:0;overflow-wrap:anywhere}\
 @media(max-width:600px){main{padding:16px 12px 40px}\
 .verdict{padding:10px 12px}.verdict dl{display:block}.verdict dd{margin:0 0 .5em}}\
 @media print{main,.report{max-width:none;padding:0}.listed{display:block}.columns{grid-template-columns:1fr 1fr}figure svg{max-width:600px}.fold>summary{border:0;padding:0}body{font-size:11pt}nav{display:none}\
-figure,.verdict,.numbers,tr{break-inside:avoid}h2,h3{break-after:avoid}.table,pre{overflow:visible}pre{white-space:pre-wrap}}\
+figure,.verdict,tr{break-inside:avoid}h2,h3{break-after:avoid}.table,pre{overflow:visible}pre{white-space:pre-wrap}}\
 ";
 
 const LIGHT: &str = "\
@@ -493,7 +444,6 @@ mod tests {
             .end_fold()
             .section("One")
             .paragraph("`host-fit <x>` and a lone ` tick \u{0}")
-            .key_numbers(&[KeyNumber::new("FIT", "<97 %>", "")])
             .table(
                 "t",
                 &[Column::Text("a<"), Column::Number("b")],
@@ -512,7 +462,7 @@ mod tests {
     #[test]
     fn everything_is_escaped() {
         let html = sample();
-        for raw in ["<b>", "<i>", "<script>", "<q>", "<97", "<1>", "\u{0}"] {
+        for raw in ["<b>", "<i>", "<script>", "<q>", "<1>", "\u{0}"] {
             assert!(!html.contains(raw), "{raw}");
         }
         assert!(html.contains("<code>host-fit &lt;x&gt;</code> and a lone ` tick \u{fffd}"));

@@ -199,11 +199,7 @@ impl Compiler {
                 let place = otherwise.span();
                 let otherwise = self.value(otherwise)?;
                 let otherwise = expect(otherwise, then.kind, place)?;
-                let op = Op::Select {
-                    condition,
-                    then: then.register,
-                    otherwise,
-                };
+                let op = Op::Select(condition, then.register, otherwise);
                 Ok(self.push(op, then.kind))
             }
             Expr::Call(call) => {

@@ -161,29 +161,20 @@ impl<T: Real> UserEffect<T> {
                 Op::Reference => setting.reference,
                 Op::Unary(f, x) if *once => f.of(results[x]),
                 Op::Binary(f, x, y) if *once => f.of(results[x], results[y]),
-                Op::Select {
-                    condition,
-                    then,
-                    otherwise,
-                } if *once => select(results[condition], results[then], results[otherwise]),
-                Op::Delayed {
-                    line,
-                    delay,
-                    longest,
-                    ..
-                } => {
+                Op::Select(condition, then, otherwise) if *once => {
+                    select(results[condition], results[then], results[otherwise])
+                }
+                Op::Delayed(d) => {
                     // Memory needed for a varying delay.
-                    let seconds = results[longest.unwrap_or(delay)];
+                    let seconds = results[d.longest.unwrap_or(d.delay)];
                     let most = T::from_count(LONGEST_DELAY);
                     let samples = (seconds / setting.period).at_most(most);
-                    taps[line] = Tap::between(samples);
+                    taps[d.line] = Tap::between(samples);
                     samples
                 }
-                Op::Unary(..)
-                | Op::Binary(..)
-                | Op::Select { .. }
-                | Op::Signal(_)
-                | Op::State(_) => T::ZERO,
+                Op::Unary(..) | Op::Binary(..) | Op::Select(..) | Op::Signal(_) | Op::State(_) => {
+                    T::ZERO
+                }
             };
         }
         let tables = program.tables.iter();
@@ -234,25 +225,18 @@ impl<T: Real> UserEffect<T> {
             results[*register] = match op {
                 Op::Unary(f, x) => f.of(results[x]),
                 Op::Binary(f, x, y) => f.of(results[x], results[y]),
-                Op::Select {
-                    condition,
-                    then,
-                    otherwise,
-                } => select(results[condition], results[then], results[otherwise]),
+                Op::Select(condition, then, otherwise) => {
+                    select(results[condition], results[then], results[otherwise])
+                }
                 Op::State(index) => states[index],
-                Op::Delayed {
-                    line,
-                    signal,
-                    delay,
-                    longest,
-                } => {
-                    let memory = &mut lines[line];
-                    memory.push(results[signal]);
-                    if longest.is_some() {
-                        let samples = results[delay] / self.setting.period;
+                Op::Delayed(d) => {
+                    let memory = &mut lines[d.line];
+                    memory.push(results[d.signal]);
+                    if d.longest.is_some() {
+                        let samples = results[d.delay] / self.setting.period;
                         Tap::between(samples.at_most(self.results[*register])).read(memory)
                     } else {
-                        self.taps[line].read(memory)
+                        self.taps[d.line].read(memory)
                     }
                 }
                 Op::Signal(signal) => match signal {

@@ -237,12 +237,7 @@ name = "own-pickup"
 place = "sensor"
 summary = "the command shows in the reading at once"
 expression = "reading + gain * u"
-[[parameter]]
-name = "gain"
-unit = "y"
-low = -0.5
-high = 0.5
-starts = [0.05]
+parameter = [{ name = "gain", unit = "y", low = -0.5, high = 0.5, starts = [0.05] }]
 "#;
 
     const VALVE: &str = r#"
@@ -250,23 +245,15 @@ name = "own-valve"
 place = "jet"
 summary = "the valve opens and closes gradually"
 expression = "opening"
+parameter = [
+    { name = "opening_time", unit = "s", low = 0.001, high = 0.05, starts = [0.004, 0.015] },
+    { name = "closing_time", unit = "s", low = 0.001, high = 0.1, starts = [0.004, 0.025] },
+]
 [[state]]
 name = "opening"
 update = """
 let time = if jet > opening { opening_time } else { closing_time };
 opening + (jet - opening) * (1.0 - exp(-period / time))"""
-[[parameter]]
-name = "opening_time"
-unit = "s"
-low = 0.001
-high = 0.05
-starts = [0.004, 0.015]
-[[parameter]]
-name = "closing_time"
-unit = "s"
-low = 0.001
-high = 0.1
-starts = [0.004, 0.025]
 "#;
 
     const ECHO: &str = r#"
@@ -274,18 +261,10 @@ name = "own-echo"
 place = "jet"
 summary = "the jet arrives a second time, later"
 expression = "jet + gain * delayed(jet, echo_delay)"
-[[parameter]]
-name = "gain"
-unit = "-"
-low = -1.0
-high = 1.0
-starts = [0.2]
-[[parameter]]
-name = "echo_delay"
-unit = "s"
-low = 0.02
-high = 0.5
-starts = [0.05]
+parameter = [
+    { name = "gain", unit = "-", low = -1.0, high = 1.0, starts = [0.2] },
+    { name = "echo_delay", unit = "s", low = 0.02, high = 0.5, starts = [0.05] },
+]
 "#;
 
     const CUBIC: &str = r#"
@@ -293,12 +272,7 @@ name = "own-cubic"
 place = "flow"
 summary = "a restoring force with the cube of the friction"
 expression = "-(cubic * relaxation) * (y * y * y)"
-[[parameter]]
-name = "cubic"
-unit = "1/y²"
-low = 0.0
-high = 5.0
-starts = [0.1]
+parameter = [{ name = "cubic", unit = "1/y²", low = 0.0, high = 5.0, starts = [0.1] }]
 "#;
 
     const TABLE: &str = r#"
@@ -306,18 +280,10 @@ name = "own-table"
 place = "sensor"
 summary = "the reading is bent"
 expression = "reading + table(reading, -0.5, low, 0.25, 0.0, 1.0, high)"
-[[parameter]]
-name = "low"
-unit = "y"
-low = -1.0
-high = 1.0
-starts = [0.1]
-[[parameter]]
-name = "high"
-unit = "y"
-low = -1.0
-high = 1.0
-starts = [0.1]
+parameter = [
+    { name = "low", unit = "y", low = -1.0, high = 1.0, starts = [0.1] },
+    { name = "high", unit = "y", low = -1.0, high = 1.0, starts = [0.1] },
+]
 "#;
 
     const DRIFT: &str = r#"
@@ -325,18 +291,10 @@ name = "own-drift"
 place = "jet"
 summary = "the jets come later and later"
 expression = "delayed(jet, early + drift * t, 0.08)"
-[[parameter]]
-name = "early"
-unit = "s"
-low = 0.0
-high = 0.1
-starts = [0.01]
-[[parameter]]
-name = "drift"
-unit = "-"
-low = -1.0
-high = 1.0
-starts = [0.1]
+parameter = [
+    { name = "early", unit = "s", low = 0.0, high = 0.1, starts = [0.01] },
+    { name = "drift", unit = "-", low = -1.0, high = 1.0, starts = [0.1] },
+]
 "#;
 
     fn definition(text: &str) -> &'static Definition {

@@ -90,21 +90,20 @@ pub(crate) enum Op {
     Signal(Signal),
     /// A state after the last sample.
     State(usize),
-    /// `signal` delayed by `delay` seconds; `line` numbers the memories. A varying delay is at most `longest`
-    /// seconds.
-    Delayed {
-        line: usize,
-        signal: Register,
-        delay: Register,
-        longest: Option<Register>,
-    },
+    Delayed(Delayed),
     Unary(Unary, Register),
     Binary(Binary, Register, Register),
-    Select {
-        condition: Register,
-        then: Register,
-        otherwise: Register,
-    },
+    /// The condition, the value where it holds, and the value elsewhere.
+    Select(Register, Register, Register),
+}
+
+/// `signal` delayed by `delay` seconds; `line` numbers the memories. A varying delay is at most `longest` seconds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Delayed {
+    pub(crate) line: usize,
+    pub(crate) signal: Register,
+    pub(crate) delay: Register,
+    pub(crate) longest: Option<Register>,
 }
 
 impl Op {
@@ -116,47 +115,27 @@ impl Op {
             | Self::Reference
             | Self::Signal(_)
             | Self::State(_) => [None; 3],
-            Self::Delayed {
-                signal,
-                delay,
-                longest,
-                ..
-            } => [Some(signal), Some(delay), longest],
+            Self::Delayed(d) => [Some(d.signal), Some(d.delay), d.longest],
             Self::Unary(_, x) => [Some(x), None, None],
             Self::Binary(_, x, y) => [Some(x), Some(y), None],
-            Self::Select {
-                condition,
-                then,
-                otherwise,
-            } => [Some(condition), Some(then), Some(otherwise)],
+            Self::Select(condition, then, otherwise) => {
+                [Some(condition), Some(then), Some(otherwise)]
+            }
         };
         all.into_iter().flatten()
     }
 
     fn with_operands(self, to: impl Fn(Register) -> Register + Copy) -> Self {
         match self {
-            Self::Delayed {
-                line,
-                signal,
-                delay,
-                longest,
-            } => Self::Delayed {
-                line,
-                signal: to(signal),
-                delay: to(delay),
-                longest: longest.map(to),
-            },
+            Self::Delayed(d) => Self::Delayed(Delayed {
+                signal: to(d.signal),
+                delay: to(d.delay),
+                longest: d.longest.map(to),
+                ..d
+            }),
             Self::Unary(f, x) => Self::Unary(f, to(x)),
             Self::Binary(f, x, y) => Self::Binary(f, to(x), to(y)),
-            Self::Select {
-                condition,
-                then,
-                otherwise,
-            } => Self::Select {
-                condition: to(condition),
-                then: to(then),
-                otherwise: to(otherwise),
-            },
+            Self::Select(x, y, z) => Self::Select(to(x), to(y), to(z)),
             Self::Number(_)
             | Self::Parameter(_)
             | Self::Period
@@ -256,26 +235,23 @@ impl Builder {
         longest: Option<Register>,
     ) -> Register {
         let mut lines = self.ops.iter().filter_map(|op| match op {
-            Op::Delayed {
-                line,
-                signal: s,
-                delay: d,
-                longest: l,
-            } if *s == signal && *d == delay && *l == longest => Some(*line),
+            Op::Delayed(d) if (d.signal, d.delay, d.longest) == (signal, delay, longest) => {
+                Some(d.line)
+            }
             _ => None,
         });
         let known = lines.next_back();
         let count = self
             .ops
             .iter()
-            .filter(|op| matches!(op, Op::Delayed { .. }))
+            .filter(|op| matches!(op, Op::Delayed(_)))
             .count();
-        self.push(Op::Delayed {
+        self.push(Op::Delayed(Delayed {
             line: known.unwrap_or(count),
             signal,
             delay,
             longest,
-        })
+        }))
     }
 
     pub(crate) fn is_once(&self, register: Register) -> bool {
@@ -338,9 +314,10 @@ impl Builder {
         };
         let state_numbers = renumbered(&carried, states.len());
         let line_alive = |line: usize| {
-            self.ops.iter().zip(&alive).any(|(op, alive)| {
-                *alive && matches!(op, Op::Delayed { line: own, .. } if *own == line)
-            })
+            self.ops
+                .iter()
+                .zip(&alive)
+                .any(|(op, alive)| *alive && matches!(op, Op::Delayed(d) if d.line == line))
         };
         let line_numbers = renumbered(&line_alive, self.ops.len());
         let ops: Vec<Op> = self
@@ -350,17 +327,10 @@ impl Builder {
             .filter(|(_, alive)| **alive)
             .map(|(op, _)| match op.with_operands(|r| registers[r]) {
                 Op::State(index) => Op::State(state_numbers[index]),
-                Op::Delayed {
-                    line,
-                    signal,
-                    delay,
-                    longest,
-                } => Op::Delayed {
-                    line: line_numbers[line],
-                    signal,
-                    delay,
-                    longest,
-                },
+                Op::Delayed(d) => Op::Delayed(Delayed {
+                    line: line_numbers[d.line],
+                    ..d
+                }),
                 op => op,
             })
             .collect();
@@ -376,10 +346,7 @@ impl Builder {
         Program {
             tables: tables.collect(),
             once: once(&ops),
-            lines: ops
-                .iter()
-                .filter(|op| matches!(op, Op::Delayed { .. }))
-                .count(),
+            lines: ops.iter().filter(|op| matches!(op, Op::Delayed(_))).count(),
             value: registers[value],
             ops,
             states,
@@ -390,7 +357,7 @@ impl Builder {
 fn once(ops: &[Op]) -> Vec<bool> {
     let mut once: Vec<bool> = Vec::with_capacity(ops.len());
     for op in ops {
-        let varies = matches!(op, Op::Signal(_) | Op::State(_) | Op::Delayed { .. });
+        let varies = matches!(op, Op::Signal(_) | Op::State(_) | Op::Delayed(_));
         let steady = |r: Register| once.get(r).copied().unwrap_or(false);
         let own = !varies && op.operands().all(steady);
         once.push(own);

@@ -2,7 +2,7 @@
 //! per line.
 
 use super::interpreter::LONGEST_DELAY;
-use super::program::{Binary, Op, Register, Signal, Unary};
+use super::program::{Binary, Delayed, Op, Register, Signal, Unary};
 use super::{Definition, UserEffect};
 use model_core::effect::{Place, Setting};
 use proc_macro2::{Ident, Literal, Punct, Spacing, TokenStream, TokenTree};
@@ -112,7 +112,7 @@ impl Writer {
         match self.op(register) {
             Op::Unary(Unary::Not, _) => true,
             Op::Binary(f, ..) => f.compares() || matches!(f, Binary::And | Binary::Or),
-            Op::Select { then, .. } => self.is_condition(then),
+            Op::Select(_, then, _) => self.is_condition(then),
             _ => false,
         }
     }
@@ -187,11 +187,7 @@ impl Writer {
                     Binary::Or => quote!(#x || #y),
                 }
             }
-            Op::Select {
-                condition,
-                then,
-                otherwise,
-            } => {
+            Op::Select(condition, then, otherwise) => {
                 let (condition, then, otherwise) = (of(condition), of(then), of(otherwise));
                 quote!(if #condition { #then } else { #otherwise })
             }
@@ -220,19 +216,15 @@ impl Writer {
                 Signal::Time => quote!(state.clock.time(self.period)),
                 Signal::SinceEdge => quote!(state.clock.since_edge(self.period)),
             },
-            Op::Delayed {
-                line,
-                delay,
-                longest: Some(_),
-                ..
-            } => {
-                let (most, line) = (format_ident!("longest{line}"), format_ident!("line{line}"));
-                let delay = self.operand(delay, false);
+            Op::Delayed(d) if d.longest.is_some() => {
+                let most = format_ident!("longest{}", d.line);
+                let line = format_ident!("line{}", d.line);
+                let delay = self.operand(d.delay, false);
                 quote!(
                     Tap::between(Real::at_most(#delay / self.period, self.#most)).read(&state.#line)
                 )
             }
-            Op::Delayed { line, .. } => {
+            Op::Delayed(Delayed { line, .. }) => {
                 let (tap, line) = (format_ident!("tap{line}"), format_ident!("line{line}"));
                 quote!(self.#tap.read(&state.#line))
             }
@@ -259,12 +251,8 @@ impl Writer {
         let program = &self.definition.program;
         let used = |(_, op, once): (Register, &Op, bool)| match op {
             // Delays become taps.
-            Op::Delayed {
-                signal,
-                longest: None,
-                ..
-            } => *signal == register,
-            Op::Delayed { signal, delay, .. } => [signal, delay].contains(&&register),
+            Op::Delayed(d) if d.longest.is_none() => d.signal == register,
+            Op::Delayed(d) => [d.signal, d.delay].contains(&register),
             op => !once && op.operands().any(|operand| operand == register),
         };
         let result = program.value == register
@@ -284,24 +272,17 @@ impl Writer {
     /// Fields of the effect.
     fn fields(&self) -> Vec<Field> {
         let mut fields = Vec::new();
-        let varying = |(_, op, _): (Register, &Op, bool)| {
-            matches!(
-                op,
-                Op::Delayed {
-                    longest: Some(_),
-                    ..
-                }
-            )
-        };
+        let varying =
+            |(_, op, _): (Register, &Op, bool)| matches!(op, Op::Delayed(d) if d.longest.is_some());
         let mut period = self.is_clocked() || self.ops().any(varying);
         let mut reference = self.reads(Signal::Channel);
         for (register, op, _) in self.ops() {
-            if let Op::Delayed {
+            if let Op::Delayed(Delayed {
                 line,
                 delay,
                 longest,
                 ..
-            } = op
+            }) = op
             {
                 let seconds = self.operand(longest.unwrap_or(*delay), true);
                 let most = number(f64::from(LONGEST_DELAY), "_f32");
@@ -433,7 +414,7 @@ impl Writer {
                     Unary::Abs | Unary::Sqrt | Unary::Exp | Unary::Cbrt | Unary::Sin | Unary::Cos,
                     _
                 ) | Op::Binary(Binary::Min | Binary::Max, ..)
-                    | Op::Delayed { .. }
+                    | Op::Delayed(_)
             )
         };
         let real = (program.ops.iter().any(calls)).then(|| {
@@ -512,9 +493,9 @@ impl Writer {
         let each = self.ops().filter(|(_, _, once)| !once);
         let each = each.map(|(register, op, _)| {
             let pushed = match op {
-                Op::Delayed { line, signal, .. } => {
-                    let (line, signal) =
-                        (format_ident!("line{line}"), self.operand(*signal, false));
+                Op::Delayed(d) => {
+                    let line = format_ident!("line{}", d.line);
+                    let signal = self.operand(d.signal, false);
                     Some(quote!(state.#line.push(#signal);))
                 }
                 _ => None,

@@ -38,63 +38,25 @@ impl Command {
     }
 
     /// The command's options without those that name files.
-    fn options(self) -> &'static [&'static str] {
-        match self {
-            Self::Identify => &[
-                "averaged",
-                "delay",
-                "effect",
-                "evaluations",
-                "interpolated",
-                "lags",
-                "max-lag",
-                "n1",
-                "n2",
-                "n3",
-                "objective",
-                "seed",
-                "threads",
-            ],
-            Self::Diagnose => &["most-effects", "seed"],
-            Self::Discover => &["terms", "without"],
-            Self::Extend => &["effect"],
-            Self::Design => &[
-                "air-price",
-                "force",
-                "goal",
-                "horizon",
-                "least-air",
-                "max-air",
-                "max-switches",
-                "min-off",
-                "min-on",
-                "pulses",
-                "ramp",
-                "seed",
-                "target",
-            ],
-            Self::Import => &[
-                "channel",
-                "fill-gaps",
-                "graded",
-                "hold-out-from",
-                "ignore-time",
-                "no-channels",
-                "period",
-                "t",
-                "t-scale",
-                "title",
-                "u",
-                "u-before",
-                "u-offset",
-                "u-scale",
-                "u-threshold",
-                "validate",
-                "y",
-                "y-offset",
-                "y-scale",
-            ],
-        }
+    fn options(self) -> impl Iterator<Item = &'static str> {
+        let all = match self {
+            Self::Identify => {
+                "averaged delay effect evaluations interpolated lags max-lag n1 n2 n3 objective \
+                 seed threads"
+            }
+            Self::Diagnose => "most-effects seed",
+            Self::Discover => "terms without",
+            Self::Extend => "effect",
+            Self::Design => {
+                "air-price force goal horizon least-air max-air max-switches min-off min-on pulses \
+                 ramp seed target"
+            }
+            Self::Import => {
+                "channel fill-gaps graded hold-out-from ignore-time no-channels period t t-scale \
+                 title u u-before u-offset u-scale u-threshold validate y y-offset y-scale"
+            }
+        };
+        all.split_whitespace()
     }
 
     /// Whether the command starts from a model.
@@ -133,12 +95,8 @@ impl Request {
     pub(super) fn read(request: &Value) -> Result<Self, String> {
         let read =
             Self::deserialize(request).map_err(|e| format!("the request cannot be read: {e}"))?;
-        let known = read.command.options();
-        if let Some(other) = read
-            .options
-            .keys()
-            .find(|name| !known.contains(&name.as_str()))
-        {
+        let is_known = |name: &&String| read.command.options().any(|known| known == *name);
+        if let Some(other) = read.options.keys().find(|name| !is_known(name)) {
             return Err(format!(
                 "`{}` does not accept the option `{other}` here",
                 read.command.name()

@@ -2,6 +2,7 @@
 //!
 //! The plants are continuous-time physics and share no code with `model-core`.
 
+mod named;
 mod nuisance;
 mod stream;
 mod waveform;

@@ -5,40 +5,20 @@ use std::fmt::Write as _;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
+use crate::named;
 use crate::plant::effects::{Physics, ThermalDrift};
 
-/// A kind of nuisance.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Nuisance {
-    /// The sensor has an offset of a few per cent.
-    Offset,
-    /// The records start in mid-run.
-    MidRun,
-    /// The offset drifts over the whole session.
-    Drift,
-    /// Commands have levels between off and on.
-    Graded,
-}
-
-impl Nuisance {
-    /// Every kind.
-    pub const ALL: [Self; 4] = [Self::Offset, Self::MidRun, Self::Drift, Self::Graded];
-
-    /// Name for tables and command lines.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Offset => "offset",
-            Self::MidRun => "mid-run",
-            Self::Drift => "drift",
-            Self::Graded => "graded",
-        }
-    }
-
-    /// The nuisance of that name.
-    pub fn of(name: &str) -> Option<Self> {
-        Self::ALL
-            .into_iter()
-            .find(|nuisance| nuisance.name() == name)
+named! {
+    /// A kind of nuisance.
+    pub enum Nuisance {
+        /// The sensor has an offset of a few per cent.
+        Offset = "offset",
+        /// The records start in mid-run.
+        MidRun = "mid-run",
+        /// The offset drifts over the whole session.
+        Drift = "drift",
+        /// Commands have levels between off and on.
+        Graded = "graded",
     }
 }
 

@@ -352,13 +352,7 @@ macro_rules! rules {
             let mut rules = $name::BUILT_IN;
             let of_room = |change: &&$crate::rules::Change| change.room == $room;
             for change in $crate::rules::changes().iter().filter(of_room) {
-                $(
-                    if change.name == stringify!($rule).replace('_', "-")
-                        && let Some(value) = $crate::rules::Ruled::from_value(&change.value)
-                    {
-                        rules.$rule = value;
-                    }
-                )+
+                $($crate::rules::take(change, stringify!($rule), &mut rules.$rule);)+
             }
             rules
         });
@@ -374,18 +368,43 @@ macro_rules! rules {
                     room: $room,
                     about: $crate::rules::paragraph(&[$($about),+]),
                     rules: vec![
-                        $($crate::rules::Rule {
-                            name: stringify!($rule).replace('_', "-"),
-                            value: self.$rule.into(),
-                            unit: $unit,
-                            meaning: $crate::rules::paragraph(&[$($meaning),+]),
-                            calibrated: $calibrated,
-                        },)+
+                        $($crate::rules::rule(
+                            stringify!($rule),
+                            self.$rule.into(),
+                            [$unit, $calibrated],
+                            &[$($meaning),+],
+                        ),)+
                     ],
                 }
             }
         }
     };
+}
+
+/// Sets a rule if the change is for it.
+pub fn take<T: Ruled>(change: &Change, rule: &str, value: &mut T) {
+    if change.name == rule.replace('_', "-")
+        && let Some(new) = T::from_value(&change.value)
+    {
+        *value = new;
+    }
+}
+
+/// A line of a rulebook.
+#[must_use]
+pub fn rule(
+    name: &str,
+    value: Value,
+    [unit, calibrated]: [&'static str; 2],
+    meaning: &[&str],
+) -> Rule {
+    Rule {
+        name: name.replace('_', "-"),
+        value,
+        unit,
+        meaning: paragraph(meaning),
+        calibrated,
+    }
 }
 
 /// The lines of a documentation comment, joined.

@@ -13,6 +13,7 @@ use recordings::Use;
 
 use crate::command::Command;
 use crate::instrument::Instrument;
+use crate::named;
 use crate::plant::{Effect, Parameter, PlantSpec};
 use crate::recording::{Recorded, RigError, Session, with_levels};
 use crate::stream::{Stream, stream};
@@ -20,95 +21,39 @@ use crate::stream::{Stream, stream};
 pub use crate::nuisance::{Nuisance, Nuisances};
 pub use crate::recording::Units;
 
-/// Family of flows.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Family {
-    /// One time constant per direction: the lowest-order bilinear model is exact.
-    FirstOrder,
-    /// The flow depends on its own past at one lag.
-    Memory1,
-    /// The flow depends on its own past at two lags.
-    Memory2,
-    /// Second order: inertia, or a second lag in series.
-    Inertia,
-    /// A slow wake reduces the level.
-    Wake,
-    /// The separation rate depends on the friction.
-    RateOfY,
-}
-
-impl Family {
-    /// Every family, in the order of tables.
-    pub const ALL: [Self; 6] = [
-        Self::FirstOrder,
-        Self::Memory1,
-        Self::Memory2,
-        Self::Inertia,
-        Self::Wake,
-        Self::RateOfY,
-    ];
-
-    /// Name for tables and command lines.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::FirstOrder => "first-order",
-            Self::Memory1 => "memory1",
-            Self::Memory2 => "memory2",
-            Self::Inertia => "inertia",
-            Self::Wake => "wake",
-            Self::RateOfY => "rate-of-y",
-        }
-    }
-
-    /// The family of that name.
-    pub fn of(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|family| family.name() == name)
+named! {
+    /// Family of flows.
+    pub enum Family {
+        /// One time constant per direction: the lowest-order bilinear model is exact.
+        FirstOrder = "first-order",
+        /// The flow depends on its own past at one lag.
+        Memory1 = "memory1",
+        /// The flow depends on its own past at two lags.
+        Memory2 = "memory2",
+        /// Second order: inertia, or a second lag in series.
+        Inertia = "inertia",
+        /// A slow wake reduces the level.
+        Wake = "wake",
+        /// The separation rate depends on the friction.
+        RateOfY = "rate-of-y",
     }
 }
 
-/// Kind of noise in the repeats.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum NoiseKind {
-    /// White only.
-    White,
-    /// White and first-order coloured, 10–40 ms.
-    Coloured,
-    /// With an additional slow component of 0.5–2 s.
-    Wander,
-    /// The level scatters between repeats by a few per cent.
-    Scatter,
-    /// White noise with the tails of Student's t.
-    HeavyTails,
-    /// Occasional readings far off.
-    Outliers,
-}
-
-impl NoiseKind {
-    /// Every kind.
-    pub const ALL: [Self; 6] = [
-        Self::White,
-        Self::Coloured,
-        Self::Wander,
-        Self::Scatter,
-        Self::HeavyTails,
-        Self::Outliers,
-    ];
-
-    /// Name for tables and command lines.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::White => "white",
-            Self::Coloured => "coloured",
-            Self::Wander => "wander",
-            Self::Scatter => "scatter",
-            Self::HeavyTails => "heavy-tails",
-            Self::Outliers => "outliers",
-        }
-    }
-
-    /// The kind of that name.
-    pub fn of(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|kind| kind.name() == name)
+named! {
+    /// Kind of noise in the repeats.
+    pub enum NoiseKind {
+        /// White only.
+        White = "white",
+        /// White and first-order coloured, 10–40 ms.
+        Coloured = "coloured",
+        /// With an additional slow component of 0.5–2 s.
+        Wander = "wander",
+        /// The level scatters between repeats by a few per cent.
+        Scatter = "scatter",
+        /// White noise with the tails of Student's t.
+        HeavyTails = "heavy-tails",
+        /// Occasional readings far off.
+        Outliers = "outliers",
     }
 }
 

@@ -11,6 +11,7 @@ use host_fit::picture::{
 };
 use host_fit::simulate::Signals;
 
+use super::page_parts::measured;
 use super::words::role_name;
 
 /// One picture per record: measurement and free runs, labelled.
@@ -27,15 +28,8 @@ pub(crate) fn overlays(records: &[Record], runs: &[(&str, &[Vec<f64>])]) -> Vec<
         let svg = overlay(&Overlay {
             title: &title,
             y_label: "friction gain y",
-            sample_period_s: record.sample_period_s,
-            t0_s: record.t0,
-            u: &record.u,
-            y: &record.y,
-            y_sd: record.y_sd.as_deref(),
-            y_min: record.y_min.as_deref(),
-            y_max: record.y_max.as_deref(),
             models: &models,
-            window_s: None,
+            ..measured(record)
         });
         (record.name.clone(), svg)
     };

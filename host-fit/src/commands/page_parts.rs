@@ -133,6 +133,20 @@ pub(crate) fn stretch_figure(
     let svg = overlay(&Overlay {
         title: &title,
         y_label: "y",
+        models: &models,
+        window_s: Some((record.t0 + stretch.from, record.t0 + stretch.to)),
+        ..measured(record)
+    });
+    let caption = format!(
+        "The {} s of the validation records with the largest error. There: {errors}.",
+        significant(stretch.to - stretch.from, 2)
+    );
+    Some((svg, caption))
+}
+
+/// The measurement of a record, for a picture.
+pub(super) fn measured(record: &Record) -> Overlay<'_> {
+    Overlay {
         sample_period_s: record.sample_period_s,
         t0_s: record.t0,
         u: &record.u,
@@ -140,14 +154,8 @@ pub(crate) fn stretch_figure(
         y_sd: record.y_sd.as_deref(),
         y_min: record.y_min.as_deref(),
         y_max: record.y_max.as_deref(),
-        models: &models,
-        window_s: Some((record.t0 + stretch.from, record.t0 + stretch.to)),
-    });
-    let caption = format!(
-        "The {} s of the validation records with the largest error. There: {errors}.",
-        significant(stretch.to - stretch.from, 2)
-    );
-    Some((svg, caption))
+        ..Overlay::default()
+    }
 }
 
 /// A picture with its caption.
@@ -187,17 +195,7 @@ pub(crate) fn check_figures(records: &[Record], runs: &[Run<'_>]) -> Vec<Figure>
     };
     let last = tested.last().cloned().unwrap_or_default();
     let mut figures = Vec::new();
-    let auto: Vec<Line<'_>> = runs
-        .iter()
-        .zip(&tested)
-        .enumerate()
-        .map(|(i, (run, (auto, _)))| Line {
-            label: run.label,
-            points: &auto.points,
-            colour: Some(i),
-            dashed: false,
-        })
-        .collect();
+    let auto = curves(runs, tested.iter().map(|(auto, _)| auto.points.as_slice()));
     figures.push((
         lines(&LinePlot {
             title: "Residual autocorrelation",
@@ -212,17 +210,10 @@ pub(crate) fn check_figures(records: &[Record], runs: &[Run<'_>]) -> Vec<Figure>
             outside(&|i| tested[i].0.outside)
         ),
     ));
-    let cross: Vec<Line<'_>> = runs
-        .iter()
-        .zip(&tested)
-        .enumerate()
-        .map(|(i, (run, (_, cross)))| Line {
-            label: run.label,
-            points: &cross.points,
-            colour: Some(i),
-            dashed: false,
-        })
-        .collect();
+    let cross = curves(
+        runs,
+        tested.iter().map(|(_, cross)| cross.points.as_slice()),
+    );
     figures.push((
         lines(&LinePlot {
             title: "Cross-correlation of u and residual",
@@ -240,6 +231,18 @@ pub(crate) fn check_figures(records: &[Record], runs: &[Run<'_>]) -> Vec<Figure>
     figures.extend(spectra(runs, &residuals));
     figures.extend(responses(runs));
     figures
+}
+
+/// A solid line for each model, in its colour.
+fn curves<'a>(runs: &[Run<'a>], points: impl Iterator<Item = &'a [(f64, f64)]>) -> Vec<Line<'a>> {
+    let labels = runs.iter().map(|run| run.label).enumerate();
+    let line = |((i, label), points)| Line {
+        label,
+        points,
+        colour: Some(i),
+        dashed: false,
+    };
+    labels.zip(points).map(line).collect()
 }
 
 fn spectra(runs: &[Run<'_>], residuals: &[Residuals]) -> Option<Figure> {
@@ -273,14 +276,7 @@ fn spectra(runs: &[Run<'_>], residuals: &[Residuals]) -> Option<Figure> {
             dashed: true,
         });
     }
-    for (i, (run, points)) in runs.iter().zip(&each).enumerate() {
-        drawn.push(Line {
-            label: run.label,
-            points,
-            colour: Some(i),
-            dashed: false,
-        });
-    }
+    drawn.extend(curves(runs, each.iter().map(Vec::as_slice)));
     Some((
         lines(&LinePlot {
             title: "Residual spectrum",

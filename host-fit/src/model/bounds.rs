@@ -159,71 +159,43 @@ mod tests {
     #[test]
     fn every_number_has_its_range_and_is_refused_with_its_key() {
         assert!(Model::from_toml(&text(), "m").is_ok());
-        for (from, to, key) in [
-            ("window = 250", "window = 4294967295", "structure.window"),
-            ("window = 250", "window = 65536", "structure.window"),
-            ("period_s = 0.001", "period_s = 1e-300", "sample_period_s"),
-            ("period_s = 0.001", "period_s = 1e300", "sample_period_s"),
+        for (name, from, to, key) in [
+            ("window", "250", "4294967295", "structure.window"),
+            ("window", "250", "65536", "structure.window"),
+            ("period_s", "0.001", "1e-300", "sample_period_s"),
+            ("period_s", "0.001", "1e300", "sample_period_s"),
+            ("delay_floor", "30.0", "1e18", "delay.delay_floor"),
+            ("delay_floor", "30.0", "-100.0", "delay.delay_floor"),
+            ("delay_floor", "30.0", "65500.0", "delay.delay_floor"),
+            ("delay_rise", "40.0", "-1e300", "delay.delay_rise"),
+            ("delay_rate", "4.0", "-4.0", "delay.delay_rate"),
+            ("factors", "[1.0]", "[-1.0]", "delay.factors"),
+            ("factors", "[1.0]", "[1e9]", "delay.factors"),
+            ("factors", "[1.0]", "[2000.0]", "delay.delay_floor"),
             (
-                "delay_floor = 30.0",
-                "delay_floor = 1e18",
-                "delay.delay_floor",
-            ),
-            (
-                "delay_floor = 30.0",
-                "delay_floor = -100.0",
-                "delay.delay_floor",
-            ),
-            (
-                "delay_floor = 30.0",
-                "delay_floor = 65500.0",
-                "delay.delay_floor",
-            ),
-            (
-                "delay_rise = 40.0",
-                "delay_rise = -1e300",
-                "delay.delay_rise",
-            ),
-            ("delay_rate = 4.0", "delay_rate = -4.0", "delay.delay_rate"),
-            ("factors = [1.0]", "factors = [-1.0]", "delay.factors"),
-            ("factors = [1.0]", "factors = [1e9]", "delay.factors"),
-            ("factors = [1.0]", "factors = [2000.0]", "delay.delay_floor"),
-            (
-                "recovery_time = 0.8",
-                "recovery_time = -0.8",
+                "recovery_time",
+                "0.8",
+                "-0.8",
                 "effect.plenum-droop.recovery_time",
             ),
             (
-                "recovery_time = 0.8",
-                "recovery_time = 1e18",
+                "recovery_time",
+                "0.8",
+                "1e18",
                 "effect.plenum-droop.recovery_time",
             ),
-            (
-                "y_range = [0.0, 1.0]",
-                "y_range = [-inf, 1.0]",
-                "training.y_range",
-            ),
-            (
-                "reachable = [0.0, 0.84]",
-                "reachable = [-inf, inf]",
-                "law.reachable",
-            ),
-            (
-                "reachable = [0.0, 0.84]",
-                "reachable = [0.0, 1e300]",
-                "law.reachable",
-            ),
-            (
-                "residual_limit = 0.8",
-                "residual_limit = 1e39",
-                "law.residual_limit",
-            ),
-            ("on = 10", "on = 4294967295", "law.hold.on"),
-            ("state_lags = [1]", "state_lags = [65536]", "line 10"),
+            ("y_range", "[0.0, 1.0]", "[-inf, 1.0]", "training.y_range"),
+            ("reachable", "[0.0, 0.84]", "[-inf, inf]", "law.reachable"),
+            ("reachable", "[0.0, 0.84]", "[0.0, 1e300]", "law.reachable"),
+            ("residual_limit", "0.8", "1e39", "law.residual_limit"),
+            ("on", "10", "4294967295", "law.hold.on"),
+            ("state_lags", "[1]", "[65536]", "line 10"),
         ] {
-            let broken = text().replacen(from, to, 1);
+            let line = |value: &str| format!("{name} = {value}");
+            let (from, to) = (line(from), line(to));
+            let broken = text().replacen(&from, &to, 1);
             assert_ne!(broken, text(), "{from}");
-            let error = Model::from_toml(&broken, "m").expect_err(to).to_string();
+            let error = Model::from_toml(&broken, "m").expect_err(&to).to_string();
             assert!(error.contains(key), "{to}: {error}");
             assert!(error.len() < 300, "{error}");
         }

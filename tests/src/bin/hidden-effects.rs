@@ -48,8 +48,8 @@ struct Arguments {
 }
 
 fn given(word: &str) -> Result<Given, String> {
-    let found = Given::ALL.into_iter().find(|given| given.word() == word);
-    found.ok_or_else(|| "one of default, lean, truth, guess, bad-delays is needed".to_owned())
+    Given::of(word)
+        .ok_or_else(|| "one of default, lean, truth, guess, bad-delays is needed".to_owned())
 }
 
 fn group(word: &str) -> Result<Group, String> {

@@ -38,7 +38,7 @@ struct Arguments {
 }
 
 fn change(word: &str) -> Result<Change, String> {
-    Change::named(word).ok_or_else(|| "not a change; --help lists them".to_owned())
+    Change::of(word).ok_or_else(|| "not a change; --help lists them".to_owned())
 }
 
 fn main() -> ExitCode {

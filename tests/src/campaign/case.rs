@@ -3,6 +3,7 @@
 use std::fmt;
 
 use firmware_sim::family::{Family, NoiseKind, Nuisance, RigPlan, Units};
+use firmware_sim::named;
 use firmware_sim::plant::{Altered, Effect, Fault, ShowsWith};
 use firmware_sim::recording::RigError;
 use rand::seq::SliceRandom;
@@ -60,42 +61,21 @@ impl Group {
     }
 }
 
-/// The model that is given to the diagnosis.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Given {
-    /// The model that `identify` makes by default; with fixed delays if a delay law is hidden.
-    Default,
-    /// One lag of each kind, identified.
-    Lean,
-    /// The true lags of the flow, identified, with a delay law unless that is hidden.
-    Truth,
-    /// A rough guess without a fit.
-    Guess,
-    /// A guess with bad delays.
-    BadDelays,
-}
-
-impl Given {
-    /// Every kind.
-    pub const ALL: [Self; 5] = [
-        Self::Default,
-        Self::Lean,
-        Self::Truth,
-        Self::Guess,
-        Self::BadDelays,
-    ];
-
-    /// Its name in keys and on command lines.
-    #[must_use]
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Default => "default",
-            Self::Lean => "lean",
-            Self::Truth => "truth",
-            Self::Guess => "guess",
-            Self::BadDelays => "bad-delays",
-        }
+named! {
+    /// The model that is given to the diagnosis.
+    #[derive(Serialize, Deserialize)]
+    #[serde(rename_all = "kebab-case")]
+    pub enum Given {
+        /// The model that `identify` makes by default; with fixed delays if a delay law is hidden.
+        Default = "default",
+        /// One lag of each kind, identified.
+        Lean = "lean",
+        /// The true lags of the flow, identified, with a delay law unless that is hidden.
+        Truth = "truth",
+        /// A rough guess without a fit.
+        Guess = "guess",
+        /// A guess with bad delays.
+        BadDelays = "bad-delays",
     }
 }
 
@@ -187,7 +167,7 @@ impl fmt::Display for Case {
         if self.units != Units::OWN {
             write!(f, "t*{},y*{}/", self.units.time, self.units.y)?;
         }
-        write!(f, "{}/{}", self.given.word(), self.seed)
+        write!(f, "{}/{}", self.given.name(), self.seed)
     }
 }
 

@@ -1,55 +1,36 @@
 //! Changes of records that do not change their information.
 
 use super::records::{Base, Part, normal};
+use firmware_sim::named;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
 
-/// A change of a data set that must not change the answer.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Change {
-    /// y → a·y + b.
-    Output,
-    /// u → α·u + β.
-    Command,
-    /// u → 1 − u.
-    Inverted,
-    /// t → c·t.
-    Clock,
-    /// Rest in front of every record.
-    Rest,
-    /// Every estimation record cut in two.
-    Cut,
-    /// The records in another order.
-    Order,
-    /// The records under other names.
-    Names,
+named! {
+    /// A change of a data set that must not change the answer.
+    #[derive(Serialize)]
+    #[serde(rename_all = "kebab-case")]
+    pub enum Change {
+        /// y → a·y + b.
+        Output = "output",
+        /// u → α·u + β.
+        Command = "command",
+        /// u → 1 − u.
+        Inverted = "inverted",
+        /// t → c·t.
+        Clock = "clock",
+        /// Rest in front of every record.
+        Rest = "rest",
+        /// Every estimation record cut in two.
+        Cut = "cut",
+        /// The records in another order.
+        Order = "order",
+        /// The records under other names.
+        Names = "names",
+    }
 }
 
 impl Change {
-    /// Every change.
-    pub const ALL: [Self; 8] = [
-        Self::Output,
-        Self::Command,
-        Self::Inverted,
-        Self::Clock,
-        Self::Rest,
-        Self::Cut,
-        Self::Order,
-        Self::Names,
-    ];
-
-    /// The change by its name, as in the option.
-    #[must_use]
-    pub fn named(word: &str) -> Option<Self> {
-        let all = [
-            "output", "command", "inverted", "clock", "rest", "cut", "order", "names",
-        ];
-        let index = all.iter().position(|name| *name == word)?;
-        Self::ALL.get(index).copied()
-    }
-
     /// The change in words.
     #[must_use]
     pub fn words(self) -> &'static str {
@@ -177,7 +158,7 @@ mod tests {
                 assert_eq!(total(&changed), total(records), "{change:?}");
             }
         }
-        assert_eq!(Change::named("cut"), Some(Change::Cut));
-        assert_eq!(Change::named("nothing"), None);
+        assert_eq!(Change::of("cut"), Some(Change::Cut));
+        assert_eq!(Change::of("nothing"), None);
     }
 }

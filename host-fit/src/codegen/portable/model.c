@@ -329,7 +329,7 @@ static void advance(struct model *s, real flow)
 }
 @if track
 
-/* The same for predictions of the law, with a less accurate average. */
+/* Stores a flow state that the law predicts, with a less accurate average. */
 static void foresee(struct model *s, real flow, real next)
 {
     @if average

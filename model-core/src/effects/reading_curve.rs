@@ -2,7 +2,8 @@
 //!
 //! This is not a missing effect but a property of the sensor's position. The friction near a moving reattachment
 //! line, or a lift that follows the separation point, is an S-shaped function of the state in which the flow is
-//! linear. It belongs to the base model, so that hysteresis and lags do not imitate it.
+//! linear. It belongs to the base model, so that hysteresis and lags do not imitate it, and acts in front of all other
+//! effects of the sensor.
 
 use crate::effect::{Effect, Instant, Parameter, Physics, Place, Setting, Spec, Unit, take};
 use crate::real::Real;

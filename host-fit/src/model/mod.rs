@@ -28,7 +28,7 @@ pub use rules::{RULES, Rules};
 use crate::user_effect::Definition;
 use model_core::average::WINDOW;
 use model_core::effect::{Place, Spec, Unit};
-use model_core::effects::{ConstantDelay, NUISANCES, SPECS, position};
+use model_core::effects::{ConstantDelay, NUISANCES, SPECS};
 use model_core::model::Averaging;
 use model_core::recursion::{Grading, LagConvention};
 use serde::{Deserialize, Serialize};
@@ -416,15 +416,14 @@ impl Model {
         self.order_effects();
     }
 
-    /// Sorts the effects into physical order: by place; in the flow, driving before resisting ones; otherwise the
-    /// order of the catalogue, with the user's own effects after the last of its effects at that place.
+    /// Sorts the effects into physical order: by place, terms that lead it first; in the flow, driving before resisting
+    /// ones; otherwise the order of the catalogue, then the user's own effects, and the base terms last.
     pub(crate) fn order_effects(&mut self) {
         let order: Vec<_> = self.known().collect();
         let rank = |added: &Added| {
             let index = order.iter().position(|spec| spec.name == added.name)?;
             let spec = order[index];
-            let position = position(spec.name, spec.place);
-            Some((spec.place, spec.resists, position, index))
+            Some((spec.place, !spec.leads, spec.resists, index))
         };
         self.effects.sort_by_key(rank);
     }

@@ -361,6 +361,8 @@ pub struct Spec {
     pub lag_in_series: bool,
     /// Whether it opposes or scales a motion: it is applied after all driving effects.
     pub resists: bool,
+    /// Whether it acts in front of all other effects of its place.
+    pub leads: bool,
     /// Additional card of a delay law.
     pub law: Option<LawCard>,
     /// Literature source.
@@ -386,6 +388,7 @@ impl Spec {
         base: false,
         lag_in_series: false,
         resists: false,
+        leads: false,
         law: None,
         source: "",
     };

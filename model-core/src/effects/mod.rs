@@ -255,7 +255,8 @@ pub const READING_CURVE: &Spec = &<ReadingCurve<f64> as Physics<f64>>::SPEC;
 /// Base terms between command, flow and reading: a search tries each from all starting values of its card.
 pub const PATH_TERMS: [&Spec; 3] = [DISPERSED_DELAY, LAGGING_DRIVE, READING_CURVE];
 
-/// The base terms with a card, in their order.
+/// The base terms with a card, in their order: after all effects of their place, because a rate acts on everything that
+/// drives the flow; a term that `leads` comes first.
 pub const NUISANCES: [&Spec; 6] = [
     DISPERSED_DELAY,
     LAGGING_DRIVE,
@@ -303,19 +304,6 @@ pub fn spec(name: &str) -> Option<&'static Spec> {
     SPECS.iter().chain(NUISANCES).find(|spec| spec.name == name)
 }
 
-/// Position of the effect or base term `name` in the physical order of its place; a user's own effect (any other
-/// name) follows the last effect of the catalogue at `place`.
-#[must_use]
-pub fn position(name: &str, place: Place) -> usize {
-    let own = EFFECTS.iter().position(|spec| spec.name == name);
-    let last = || {
-        let of_place =
-            |spec: &Spec| !spec.base && !spec.resists && spec.place as usize == place as usize;
-        EFFECTS.iter().rposition(of_place).unwrap_or(0)
-    };
-    own.unwrap_or_else(last)
-}
-
 /// The card of the delay law `name`: a base term or an effect.
 #[must_use]
 pub fn law(name: &str) -> Option<&'static Spec> {
@@ -326,30 +314,6 @@ pub fn law(name: &str) -> Option<&'static Spec> {
 mod tests {
     use super::*;
     use crate::effect::Starts;
-
-    /// A static curve between flow and friction is in front of the film, a user's effect behind the film's, and the
-    /// offset of the reading comes last.
-    #[test]
-    fn the_signal_passes_curve_film_own_effects_and_offset() {
-        let names = [
-            "reading-curve",
-            "vortex-shedding",
-            "hot-film-lag",
-            "thermal-drift",
-            "a user's own",
-            "zero-offset",
-        ];
-        assert!(names.map(|name| position(name, Place::Sensor)).is_sorted());
-        let names = ["valve-lag", "a user's own", "dispersed-delay"];
-        assert!(names.map(|name| position(name, Place::Jet)).is_sorted());
-        let names = [
-            "bouc-wen-hysteresis",
-            "a user's own",
-            "slow-wake",
-            "level-rate",
-        ];
-        assert!(names.map(|name| position(name, Place::Flow)).is_sorted());
-    }
 
     #[test]
     fn cards_are_whole() {

@@ -52,6 +52,7 @@ impl<T: Real> Physics<T> for ReadingCurve<T> {
             Parameter::new("width", Unit::Y, [0.05, 10.0], &[0.4, 1.0]),
         ],
         base: true,
+        leads: true,
         source: "static curves of the separation point: Goman and Khrabrov, J. Aircraft 31 (1994); friction at reattachment: Eaton and Johnston, AIAA J. 19 (1981)",
         ..Spec::PLAIN
     };

@@ -22,21 +22,20 @@ pub const QUICK_DESIGN: &str = "--set design.trial=6000 --set design.trial-from=
 pub type Parts<'a> = &'a [&'a dyn AsRef<OsStr>];
 
 /// `host-fit` with the words of `line`. Each `{}` stands for the next of `parts`, which may contain spaces.
+///
+/// # Panics
+/// Unless there are as many `{}` as parts.
 #[must_use]
 pub fn host_fit(line: &str, parts: Parts<'_>) -> Command {
     let mut command = Command::new(program());
     let mut parts = parts.iter();
     for word in line.split_whitespace() {
-        match parts.as_slice() {
-            [part, ..] if word == "{}" => {
-                command.arg(part);
-                parts.next();
-            }
-            _ => {
-                command.arg(word);
-            }
-        }
+        match word {
+            "{}" => command.arg(parts.next().expect("a part for each {}")),
+            word => command.arg(word),
+        };
     }
+    assert!(parts.next().is_none(), "a part without a {{}}");
     command
 }
 
@@ -44,23 +43,21 @@ pub fn host_fit(line: &str, parts: Parts<'_>) -> Command {
 #[must_use]
 pub fn first_order(a: f64, b: f64, delay: &str) -> String {
     format!(
-        "format_version = 1
+        r#"format_version = 1
 sample_period_s = 0.001
-lag_convention = \"one-step\"
+lag_convention = "one-step"
 [structure]
 averaged = false
-\
-         window = 250
+window = 250
 state_lags = [1]
 product_lags = [1]
 [coefficients]
 a = [{a}]
 b = [{b}]
 c = [[0.0]]
-\
-         [delay]
+[delay]
 {delay}
-"
+"#
     )
 }
 

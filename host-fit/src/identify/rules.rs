@@ -32,7 +32,7 @@ rules! {
     /// Lags that a kick of the free-run search replaces.
     kicked_lags: usize = 2, "lags", "tuned on sets 1 to 3 of docs/search.md";
     /// Least distance of a lag that replaces another in such a kick.
-    kick_distance: u16 = 4, "samples", "a descent moves lags by smaller distances";
+    kick_distance: u16 = 4, "samples", "a descent reaches nearer lags by itself";
     /// Number of predicted minima per slot that are simulated.
     minima: usize = 7, "lags", "judgement";
     /// A predicted minimum is simulated if it is below this.

@@ -19,15 +19,15 @@ pub struct ReadingCurve<T> {
     natural: T,
 }
 
-/// Above this, tanh(x/2) rounds to 1 in double precision, and its slope to 0.
-const LEVEL: f64 = 40.0;
+/// Above this x, tanh(x/2) rounds to 1 in double precision, and its slope, below 10⁻¹⁶, is taken as 0.
+const SATURATED: f64 = 40.0;
 
 /// tanh(x/2).
 #[inline(always)]
 fn tanh_of_half<T: Real>(x: T) -> T {
     let two = T::ONE + T::ONE;
     // The slope of the exponential overflows before its quotient vanishes.
-    T::ONE - two / (x.at_most(T::from_f64(LEVEL)).exp() + T::ONE)
+    T::ONE - two / (x.at_most(T::from_f64(SATURATED)).exp() + T::ONE)
 }
 
 impl<T: Real> Effect<T> for ReadingCurve<T> {
@@ -94,7 +94,7 @@ mod tests {
         for x in [100.0_f32, 1e6, f32::MAX] {
             assert_eq!((tanh_of_half(x), tanh_of_half(-x)), (1.0, -1.0));
         }
-        for x in [100.0_f64, 1e6, f64::MAX] {
+        for x in [SATURATED, 100.0, 1e6, f64::MAX] {
             assert_eq!((tanh_of_half(x), tanh_of_half(-x)), (1.0, -1.0));
         }
     }

@@ -1,24 +1,19 @@
-//! Addition of physical effects to a model with a full refit.
+//! Addition of physical effects to a model: the search of a diagnosis with these effects in every model.
 //!
-//! A model of high order imitates part of a missing effect. The effects are therefore added to the given
-//! structure and to the one of lowest order, and the better of the two is kept; if both fit equally well, the
-//! one with fewer parameters.
+//! A model without an effect imitates part of it by lags and base terms. They are therefore searched again with
+//! the effects, from the lowest order and from the given structure.
 
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use crate::data::{Record, Use};
-use crate::diagnose::ParameterEstimate;
-use crate::fit::{
-    CandidateError, Fit, FitOptions, RULES, channel_reference, fit, fit_with_effect, lean_base,
-    pieces_of,
-};
-use crate::model::{Model, Start};
-use crate::preparation::Preparation;
+use crate::data::Record;
+use crate::diagnose::{Given, ParameterEstimate, estimates_among, kept_back};
+use crate::excitation::bears_little;
+use crate::fit::{CandidateError, channel_reference, fit_with_effect};
+use crate::model::Model;
 use crate::simulate::SimulateError;
-use crate::terms::{Units, restarted};
+use crate::terms::{Bench, Hypothesis, Judged, Search};
 use model_core::effect::Spec;
-use serde::Serialize;
 use strsim::levenshtein;
 use thiserror::Error;
 
@@ -56,27 +51,13 @@ pub enum ExtendError {
     Simulate(#[from] SimulateError),
 }
 
-/// Which structure the effects were added to.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum StructureKept {
-    /// The structure of the given model.
-    Given,
-    /// The lowest order: one lag each and one input.
-    Lean,
-}
-
 /// A model with effects added.
 #[derive(Clone, Debug)]
 pub struct Extended {
     /// The model.
     pub model: Model,
-    /// The structure to which the effects were added.
-    pub structure: StructureKept,
     /// Parameters of the added effects: by effect, by name.
     pub parameters: BTreeMap<String, BTreeMap<String, ParameterEstimate>>,
-    /// Root mean square error of the free run on the identify records, y.
-    pub identify_rmse: f64,
 }
 
 /// The message for a name that is not among the `known` ones.
@@ -121,130 +102,111 @@ pub fn effects_for(model: &Model, names: &[String]) -> Result<Vec<&'static Spec>
     Ok(specs)
 }
 
-/// Adds the effects `names` to `model` and refits all parameters to the identify records among `records` (see
-/// [`Model::targets`]).
+/// Adds the effects `names` to `model`, and chooses lags and base terms again with them. Records are those of a
+/// diagnosis (see [`Model::targets`]), so that both give the same model.
 ///
 /// # Errors
-/// [`ExtendError`]; a missing channel is named, not guessed. `interrupt` is checked between fits.
+/// [`ExtendError`]; a missing channel is named, not guessed. After an interrupt there is no result.
 pub fn extend(
     model: &Model,
     records: &[Record],
     names: &[String],
     interrupt: &AtomicBool,
+    progress: &(dyn Fn(&str) + Sync),
 ) -> Result<Extended, ExtendError> {
     let specs = effects_for(model, names)?;
-    // Cards are written for y of order 1 and 1 ms a sample, as for a diagnosis.
-    let prepared = Preparation::of(records);
-    let units = Units::of(model, &prepared);
-    let records = units.records_in(&prepared.records);
-    let (model, records) = (&units.model_in(model), records.as_slice());
-    let learning: Vec<&Record> = records.iter().filter(|r| r.role == Use::Identify).collect();
-    if learning.is_empty() {
-        return Err(ExtendError::NothingToLearnFrom);
-    }
     // A validation record without the channel could not be simulated afterwards.
     let all: Vec<&Record> = records.iter().collect();
     for spec in &specs {
         channel_reference(spec, &all)?;
     }
-    let options = FitOptions {
-        constant: model.constant != 0.0,
-        ..FitOptions::default()
+    let chosen_by = kept_back(records).map(|(chosen_by, _)| chosen_by);
+    let records = chosen_by.as_deref().unwrap_or(records);
+    let bench = Bench::of(model, records).ok_or(ExtendError::NothingToLearnFrom)?;
+    let (judge, given, units) = (&bench.judge, &bench.given, &bench.units);
+    let search = Search {
+        progress,
+        ..Search::silent(judge, 0, interrupt)
     };
-    let cut: Vec<Record>;
-    let learning = match restarted(model, records, prepared.reference.as_ref()) {
-        Some(samples) => {
-            cut = pieces_of(learning, samples);
-            cut.iter().collect()
-        }
-        None => learning,
+    let with_effects = |base: &Model| with_all(&search, base, &specs);
+    let lean = |frame: &Model| {
+        let mut bare = frame.clone();
+        bare.effects.retain(|added| !names.contains(&added.name));
+        let lean = search.root(&bare, bench.mid_run)?;
+        with_effects(lean.judged.model())
     };
-    let with_each = |base: &Model, specs: &mut dyn Iterator<Item = &&'static Spec>| {
-        let mut current = base.clone();
-        let mut last = None;
-        for spec in specs {
-            if interrupt.load(Ordering::Relaxed) {
-                return Err(ExtendError::Interrupted);
-            }
-            let fitted = fit_with_effect(&current, spec, &learning, &options)?;
-            current = fitted.model.clone();
-            last = Some(fitted);
+    progress("the given structure with the effects");
+    let as_given = with_effects(given);
+    let searched = !bears_little(records) && !search.keeps_lags(given, bench.mid_run);
+    let as_lean = searched.then(|| {
+        progress("the model with the fewest lags and the effects");
+        lean(given)
+    });
+    let (best, alike) = match (as_given, as_lean) {
+        (as_given, Some(Ok(as_lean))) => {
+            let with = as_given.as_ref().unwrap_or(&as_lean);
+            let starts = Given {
+                model: with.model(),
+                rmse: with.rmse(),
+                keeps_lags: false,
+                root: &|frame| lean(frame).map(Hypothesis::new),
+            };
+            let root = Hypothesis::new(as_lean.clone());
+            let found = search.thorough(root, &starts).0;
+            let alike = found.as_good_as(&found.best).into_iter().cloned().collect();
+            (found.best.judged, alike)
         }
-        match last {
-            // Effects added one by one are refitted together.
-            Some(fitted) if names.len() == 1 => Ok(fitted),
-            _ if interrupt.load(Ordering::Relaxed) => Err(ExtendError::Interrupted),
-            _ => Ok::<Fit, ExtendError>(fit(&current, &learning, &options)?),
-        }
-    };
-    // The first of two effects may be fitted to imitate the second and stay there: both orders are tried.
-    let with_all = |base: Model| {
-        let forth = with_each(&base, &mut specs.iter());
-        if specs.len() < 2 {
-            return forth;
-        }
-        match (forth, with_each(&base, &mut specs.iter().rev())) {
-            (Ok(forth), Ok(back)) if back.mean_square() < forth.mean_square() => Ok(back),
-            (Err(_), back) => back,
-            (forth, _) => forth,
-        }
-    };
-    let given = with_all(model.clone());
-    let lean = if model.start == Start::Rest && !interrupt.load(Ordering::Relaxed) {
-        lean_structure(model, &learning, &options).and_then(with_all)
-    } else {
-        Err(ExtendError::NothingToLearnFrom)
+        (as_given, _) => (as_given?, Vec::new()),
     };
     // After an interrupt the intermediate result is not the best: no result is returned.
     if interrupt.load(Ordering::Relaxed) {
         return Err(ExtendError::Interrupted);
     }
-    let (fitted, structure) = match (given, lean) {
-        (Ok(given), Ok(lean)) => {
-            let as_good = given.mean_square() * RULES.as_good * RULES.as_good;
-            if lean.mean_square() <= as_good {
-                (lean, StructureKept::Lean)
-            } else {
-                (given, StructureKept::Given)
-            }
-        }
-        (Ok(given), Err(_)) => (given, StructureKept::Given),
-        (Err(_), Ok(lean)) => (lean, StructureKept::Lean),
-        (Err(error), Err(_)) => return Err(error),
-    };
+    let end = judge.final_fit(&best);
+    let alike: Vec<&Model> = alike.iter().collect();
     let parameters = specs.iter().map(|spec| {
-        let own = crate::diagnose::estimates(&fitted, spec, &units);
+        let own = estimates_among(&end, &alike, spec, units);
         (spec.name.to_owned(), own)
     });
     Ok(Extended {
-        structure,
         parameters: parameters.collect(),
-        identify_rmse: units.y * fitted.mean_square().sqrt(),
         model: Model {
             // A control law belongs to the model it was designed for.
             law: None,
-            ..units.model_out(&fitted.model)
+            ..units.model_out(&end.model)
         },
     })
 }
 
-/// The lowest-order structure with the effects of `model`.
-fn lean_structure(
-    model: &Model,
-    learning: &[&Record],
-    options: &FitOptions,
-) -> Result<Model, ExtendError> {
-    let mut bare = model.clone();
-    let kept = std::mem::take(&mut bare.effects);
-    let lean = lean_base(&bare, learning)?;
-    if kept.is_empty() {
-        return Ok(lean.model);
-    }
-    let with_kept = Model {
-        effects: kept,
-        ..lean.model
+/// `base` with all effects, refitted. The first of two effects may be fitted to imitate the second and stay there:
+/// both orders are tried.
+fn with_all(
+    search: &Search<'_>,
+    base: &Model,
+    specs: &[&'static Spec],
+) -> Result<Judged, ExtendError> {
+    let judge = search.judge;
+    let learning = judge.learning(0);
+    let in_order = |specs: &mut dyn Iterator<Item = &&'static Spec>| {
+        let mut current = base.clone();
+        for spec in specs {
+            if search.interrupt.load(Ordering::Relaxed) {
+                return Err(ExtendError::Interrupted);
+            }
+            let options = judge.options_for(&current);
+            current = fit_with_effect(&current, spec, &learning, &options)?.model;
+        }
+        Ok(judge.refitted(&current)?)
     };
-    Ok(fit(&with_kept, learning, options)?.model)
+    let forth = in_order(&mut specs.iter());
+    if specs.len() < 2 {
+        return forth;
+    }
+    match (forth, in_order(&mut specs.iter().rev())) {
+        (Ok(forth), Ok(back)) if back.rmse() < forth.rmse() => Ok(back),
+        (Err(_), back) => back,
+        (forth, _) => forth,
+    }
 }
 
 #[cfg(test)]

@@ -298,6 +298,29 @@ fn extend_finds_the_hidden_plenum() {
     assert_eq!(compared["validate"]["rmse"], after["rmse"]);
 }
 
+/// `identify` imitates the droop by base terms. With the droop they are dropped, and the error is that of the diagnosis.
+#[test]
+fn extend_drops_the_terms_that_imitate_the_effect() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let ramp = part_of_the_ramp(folder.path());
+    let imitating = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/imitates-a-droop.toml");
+    let (out, diagnosed) = (
+        folder.path().join("new.toml"),
+        folder.path().join("diagnosed.toml"),
+    );
+    let found = json("diagnose {} {} -o {}", &[&imitating, &ramp, &diagnosed]);
+    assert_eq!(found["missing"], serde_json::json!(["plenum-droop"]));
+    let line = "extend {} {} --effect plenum-droop -o {}";
+    let extended = json(line, &[&imitating, &ramp, &out]);
+    let dropped = serde_json::json!(["slow-wake", "level-rate", "reading-curve", "lags"]);
+    assert_eq!(extended["dropped"], dropped);
+    let error = |of: &Value| number(&of["rmse"]);
+    let compared = json("compare {} {}", &[&diagnosed, &ramp]);
+    let by_diagnosis = error(&compared["validate"]);
+    assert!(error(&extended["after"]) < 1.01 * by_diagnosis);
+    assert!(error(&extended["after"]) < error(&extended["before"]));
+}
+
 #[test]
 fn diagnose_names_the_hidden_plenum() {
     let folder = tempfile::tempdir().expect("a folder");

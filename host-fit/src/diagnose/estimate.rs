@@ -25,7 +25,7 @@ pub struct ParameterEstimate {
 }
 
 /// Estimates of an effect's parameters with 95 % intervals, of a fit in inner `units`.
-pub(crate) fn estimates(
+pub(super) fn estimates(
     fit: &Fit,
     spec: &Spec,
     units: &Units,

@@ -12,23 +12,26 @@ mod quoted;
 mod ranking;
 mod rules;
 mod session;
+mod thorough;
 mod verdict;
 
 pub use crate::terms::HeldOutBy;
 pub use certificate::{Certificate, Parsimony};
 pub use estimate::ParameterEstimate;
-pub(crate) use estimate::estimates;
+pub(crate) use estimate::estimates_among;
 pub use memory::Memory;
 pub use outcome::{Diagnosis, NotTried, Ranked, Rung, Verdict};
 pub use quoted::Quoted;
+pub(crate) use quoted::kept_back;
 pub use ranking::{FLOW_LAG, FLOW_MEMORY};
 pub use rules::{RULES, Rules};
+pub(crate) use thorough::Given;
 
 use crate::data::Record;
 use crate::excitation::bears_little;
-use crate::model::{Model, Start};
+use crate::model::Model;
 use crate::simulate::SimulateError;
-use crate::terms::{Bench, Effort, Hypothesis, Known, Search};
+use crate::terms::{Bench, Hypothesis, Known, Search};
 use session::Session;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -81,7 +84,7 @@ pub fn diagnose(
     interrupt: &AtomicBool,
     progress: &(dyn Fn(&str) + Sync),
 ) -> Result<Diagnosis, DiagnoseError> {
-    let Some((chosen_by, kept)) = quoted::kept_back(records) else {
+    let Some((chosen_by, kept)) = kept_back(records) else {
         return chosen(given, records, options, interrupt, progress);
     };
     let diagnosis = chosen(given, &chosen_by, options, interrupt, progress)?;
@@ -145,10 +148,8 @@ fn chosen(
         return Ok(session.conclude(given_alone.alone(), rungs, None));
     }
     progress("the model with the fewest lags");
-    // Graded commands and records that start in mid-run: not a flow with jets, so the lags that the user chose are
-    // kept.
-    let own_dynamics = mid_run && given.start == Start::Measured && !judge.on_off;
-    let (root, step) = if own_dynamics {
+    let keeps_lags = search.keeps_lags(&given_inside, mid_run);
+    let (root, step) = if keeps_lags {
         session.root_of_given()?
     } else {
         let root = search.root(&given_inside, mid_run)?;
@@ -157,53 +158,13 @@ fn chosen(
     if interrupt.load(Ordering::Relaxed) {
         return Err(DiagnoseError::Interrupted);
     }
-    let mut origin = root.clone();
-    let mut effort = Effort::of_a_search();
-    let mut found = search.run_within(
-        root,
-        Some(&|| search.second_roots(&given_inside, &origin)),
-        &mut effort,
-    );
-    // The given structure may contain terms that the search cannot reach by single steps.
-    let reached = found.best.judged.rmse();
-    if (judge.over_noise(reached) > RULES.floor_margin
-        || reached > (1.0 - RULES.worthwhile) * as_given.rmse())
-        && !effort.is_spent()
-        && !found.set_out_twice()
-        && (own_dynamics || !origin.is_built_as(&given_inside))
-        && let Ok(judged) = judge.refitted(&given_inside)
-        && judged.rmse() < origin.judged.rmse()
-    {
-        let from_given = search.run_within(Hypothesis::new(judged), None, &mut effort);
-        if from_given.best.judged.rmse() < (1.0 - RULES.worthwhile) * reached {
-            found = from_given;
-        }
-    }
-    // The form of the delay law in the given model was chosen without the effects. With them another form may have
-    // a lower error.
-    if judge.over_noise(found.best.judged.rmse()) > RULES.floor_margin
-        && given_inside.delay.follows_y()
-        && !effort.is_spent()
-        && let Some(other) = search.after_another_law(&found.best, &[])
-        && other.judged.rmse() < (1.0 - RULES.worthwhile) * found.best.judged.rmse()
-    {
-        progress("again with another delay law");
-        let with_law = Model {
-            delay: other.judged.model().delay.clone(),
-            ..given_inside.clone()
-        };
-        if let Ok(root) = search.root(&with_law, mid_run) {
-            let set_out = root.clone();
-            let anew = search.run_within(
-                root,
-                Some(&|| search.second_roots(&with_law, &set_out)),
-                &mut effort,
-            );
-            if anew.best.score() < found.best.score() {
-                (found, origin) = (anew, set_out);
-            }
-        }
-    }
+    let starts = Given {
+        model: &given_inside,
+        rmse: as_given.rmse(),
+        keeps_lags,
+        root: &|model| search.root(model, mid_run),
+    };
+    let (found, origin) = search.thorough(root, &starts);
     let restarted_s = restarted.map(|samples| samples as f64 * given.sample_period_s);
     let second = session.rung(&origin.judged, &[], step);
     let rungs = [first.clone(), second];

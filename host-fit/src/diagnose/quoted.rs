@@ -21,7 +21,7 @@ pub struct Quoted {
 
 /// Splits the validation records: every third one is set aside for an independent estimate, the structure is
 /// chosen on the others. `None` if there are too few.
-pub(super) fn kept_back(records: &[Record]) -> Option<(Vec<Record>, Vec<Record>)> {
+pub(crate) fn kept_back(records: &[Record]) -> Option<(Vec<Record>, Vec<Record>)> {
     let held_out = records.iter().filter(|r| r.role == Use::Validate).count();
     if held_out < RULES.enough_to_quote {
         return None;

@@ -1,8 +1,9 @@
 //! Ranking of the candidates on one model, and which of them are not distinguishable.
 
 use super::certificate::Certificate;
+use super::estimate::estimates;
 use super::session::Session;
-use super::{NotTried, RULES, Ranked, estimates};
+use super::{NotTried, RULES, Ranked};
 use crate::model::Model;
 use crate::parallel;
 use crate::terms::{

@@ -70,8 +70,6 @@ rules! {
     /// Correlation length assumed for the remaining noise.
     correlated: f64 = 40.0, "samples", "a hot film at 1 kHz; a value four times as large doubles the weight of errors along y";
 
-    /// A lowest-order model with effects is kept if its error is within this factor of the given structure's.
-    as_good: f64 = 1.02, "times the rms error", "judgement";
 
     /// Number of runs that a record of a drifting plant is divided into.
     pieces: usize = 20, "", "judgement; the ball screw EMPS in docs/history/diagnosis.md";

@@ -9,7 +9,7 @@ use super::prepared::prepared;
 use super::{Answer, Onlooker, StepError, check_period, level, trained_in_free_run};
 use crate::data::{DataSet, Use};
 use crate::diagnose::ParameterEstimate;
-use crate::extend::{Extended, StructureKept, extend as refit};
+use crate::extend::{Extended, extend as refit};
 use crate::indicators::{Indicators, Scores, score, score_new};
 use crate::model::Model;
 use crate::picture::significant;
@@ -32,11 +32,8 @@ pub struct Extension {
     pub before: Option<Indicators>,
     /// Validation indicators after.
     pub after: Option<Indicators>,
-    /// Origin of the structure.
-    pub structure: StructureKept,
-    /// Whether the lowest-order structure was used because it fits equally well as the given one.
-    #[serde(skip)]
-    pub dropped_lags: bool,
+    /// Terms of the given model that the new one does not need: base terms by name, `lags`.
+    pub dropped: Vec<String>,
     /// Error of each record before and after.
     pub records: Vec<RecordChange>,
     /// All indicators before.
@@ -65,6 +62,16 @@ fn one_or_several<S: Serializer>(effects: &[String], serializer: S) -> Result<S:
         [one] => one.serialize(serializer),
         several => several.serialize(serializer),
     }
+}
+
+/// Base terms of `model` that `extended` lacks, and `lags` if it has fewer of them.
+fn dropped(model: &Model, extended: &Model) -> Vec<String> {
+    let lags = |model: &Model| model.state_lags.len() + model.product_lags.len();
+    let mut dropped = model.effect_names();
+    let kept = extended.effect_names();
+    dropped.retain(|name| !kept.contains(name));
+    dropped.extend((lags(extended) < lags(model)).then(|| "lags".to_owned()));
+    dropped
 }
 
 /// A model with a larger error than the given one is rejected.
@@ -122,12 +129,11 @@ pub fn extend(
     let scores_before = score(model, &records).ok().map(|(scores, _)| scores);
     let Extended {
         model: mut extended,
-        structure,
         parameters,
-        ..
     } = watched(onlooker, "refitting everything", || {
         let knowing = model.with_inputs(measured_inputs(&records));
-        refit(&knowing, &records, effects, onlooker.interrupt())
+        let progress = |what: &str| onlooker.now(what);
+        refit(&knowing, &records, effects, onlooker.interrupt(), &progress)
     })?;
     extended.forget_unused(model);
     let (scores_after, diverged) = score_new(&extended, &records)?;
@@ -159,9 +165,7 @@ pub fn extend(
         parameters: parameters.collect(),
         before: scores_before.as_ref().and_then(Scores::held_out).cloned(),
         after: scores_after.held_out().cloned(),
-        structure,
-        dropped_lags: structure == StructureKept::Lean
-            && model.state_lags.len() + model.product_lags.len() > 2,
+        dropped: dropped(model, &extended),
         records: changes
             .map(|(index, after)| RecordChange {
                 name: after.name.clone(),

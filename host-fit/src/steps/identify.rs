@@ -458,7 +458,14 @@ fn with_effects(
         model = model.with_inputs(measured_inputs(records));
         effects_for(&model, &request.effects)?;
         model = watched(onlooker, "refitting with the effects", || {
-            extend(&model, records, &request.effects, onlooker.interrupt())
+            let progress = |what: &str| onlooker.now(what);
+            extend(
+                &model,
+                records,
+                &request.effects,
+                onlooker.interrupt(),
+                &progress,
+            )
         })?
         .model;
         model.forget_unused(&given);

@@ -58,11 +58,7 @@ impl Bench {
 /// drift. `None` if the first-order `reference` forgets its initial state well within the records: a model that
 /// lacks an input may have a pole at 1 although the plant has none. `None`, too, if runs over whole estimation records
 /// do not drift: their error is then no larger than that of restarted runs, which begin with the noise of a sample.
-pub(crate) fn restarted(
-    model: &Model,
-    records: &[Record],
-    reference: Option<&FirstOrder>,
-) -> Option<usize> {
+fn restarted(model: &Model, records: &[Record], reference: Option<&FirstOrder>) -> Option<usize> {
     let shortest = records.iter().map(Record::len).min()? as f64;
     let forgets = reference.is_some_and(|reference| {
         reference.explained > RULES.self_regulates

@@ -35,7 +35,6 @@ mod units;
 pub use crate::fit::Known;
 pub use automatic::{Automatic, Frame, base_model};
 pub use bench::Bench;
-pub(crate) use bench::restarted;
 pub(crate) use certificate::{MostLikely, log_e, p_of};
 pub use effort::Effort;
 pub(crate) use evidence::{HeldOut, p_value};

@@ -226,12 +226,12 @@ pub(crate) fn side_by_side_rows(found: &SideBySide) -> Vec<Vec<String>> {
 impl Words for Extension {
     fn words(&self) -> String {
         let mut told = vec![self.answer.words(), String::new(), describe(&self.model)];
-        if self.dropped_lags {
-            told.push(
-                "With the effect, one lag of each kind fits equally well, so this model has fewer lags than \
-                     the given one."
-                    .to_owned(),
-            );
+        if !self.dropped.is_empty() {
+            told.push(format!(
+                "No longer needed with {}: {}.",
+                self.effects.join(" and "),
+                self.dropped.join(", ")
+            ));
         }
         if !self.parameters.is_empty() {
             told.push(parameter_table(&self.parameters));

@@ -1,0 +1,85 @@
+//! A search from every start that a model and its records offer.
+
+use super::RULES;
+use crate::model::{Model, Start};
+use crate::terms::{Effort, Found, Hypothesis, Search};
+
+/// The given model, and how further starts are made of it.
+pub(crate) struct Given<'a, E> {
+    /// The model, in inner units.
+    pub(crate) model: &'a Model,
+    /// Its root mean square error on the validation records.
+    pub(crate) rmse: f64,
+    /// Whether the lags of the model are kept, so that the search starts from its structure.
+    pub(crate) keeps_lags: bool,
+    /// The model of the lowest order with the delay law of another model.
+    pub(crate) root: &'a dyn Fn(&Model) -> Result<Hypothesis, E>,
+}
+
+impl Search<'_> {
+    /// Whether the lags that the user chose are kept: graded commands and records that start in mid-run are not a
+    /// flow with jets.
+    pub(crate) fn keeps_lags(&self, given: &Model, mid_run: bool) -> bool {
+        mid_run && given.start == Start::Measured && !self.judge.on_off
+    }
+
+    /// The best model from `root`, from the structure of the given model, and with another delay law; and the root
+    /// from which it was found.
+    pub(crate) fn thorough<E>(
+        &self,
+        root: Hypothesis,
+        given: &Given<'_, E>,
+    ) -> (Found, Hypothesis) {
+        let judge = self.judge;
+        let (model, below) = (given.model, 1.0 - RULES.worthwhile);
+        let mut origin = root.clone();
+        let mut effort = Effort::of_a_search();
+        let mut found = self.run_within(
+            root,
+            Some(&|| self.second_roots(model, &origin)),
+            &mut effort,
+        );
+        let reached = found.best.judged.rmse();
+        let misses = |rmse: f64| judge.over_noise(rmse) > RULES.floor_margin;
+        // The given structure may contain terms that the search cannot reach by single steps.
+        if (misses(reached) || reached > below * given.rmse)
+            && !effort.is_spent()
+            && !found.set_out_twice()
+            && (given.keeps_lags || !origin.is_built_as(model))
+            && let Ok(judged) = judge.refitted(model)
+            && judged.rmse() < origin.judged.rmse()
+        {
+            let from_given = self.run_within(Hypothesis::new(judged), None, &mut effort);
+            if from_given.best.judged.rmse() < below * reached {
+                found = from_given;
+            }
+        }
+        // The form of the delay law in the given model was chosen without the effects. With them another form may
+        // have a lower error.
+        let reached = found.best.judged.rmse();
+        if misses(reached)
+            && model.delay.follows_y()
+            && !effort.is_spent()
+            && let Some(other) = self.after_another_law(&found.best, &[])
+            && other.judged.rmse() < below * reached
+        {
+            (self.progress)("again with another delay law");
+            let with_law = Model {
+                delay: other.judged.model().delay.clone(),
+                ..model.clone()
+            };
+            if let Ok(root) = (given.root)(&with_law) {
+                let set_out = root.clone();
+                let anew = self.run_within(
+                    root,
+                    Some(&|| self.second_roots(&with_law, &set_out)),
+                    &mut effort,
+                );
+                if anew.best.score() < found.best.score() {
+                    (found, origin) = (anew, set_out);
+                }
+            }
+        }
+        (found, origin)
+    }
+}

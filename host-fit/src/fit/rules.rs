@@ -70,7 +70,6 @@ rules! {
     /// Correlation length assumed for the remaining noise.
     correlated: f64 = 40.0, "samples", "a hot film at 1 kHz; a value four times as large doubles the weight of errors along y";
 
-
     /// Number of runs that a record of a drifting plant is divided into.
     pieces: usize = 20, "", "judgement; the ball screw EMPS in docs/history/diagnosis.md";
     /// A piece is at least this multiple of the longest lag or delay. One part in this many precedes scoring.

@@ -54,6 +54,7 @@ fn law() -> impl Strategy<Value = Option<Law>> {
                 reachable: [x[1].min(x[0] - 1.0), x[2].max(x[0] + 1.0)],
                 slope: x[3].abs(),
                 hold,
+                anticipation: Some([lead.into(), opening.into()]),
                 switches: None,
                 air: None,
                 lead: lead / 2 + 1,

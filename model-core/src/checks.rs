@@ -80,14 +80,14 @@ pub const fn law(law: &Tracking<f32>) -> bool {
 /// Samples that a tracking law looks ahead when the first arrival is `delay` away.
 #[must_use]
 pub const fn look_ahead<T>(law: &Tracking<T>, delay: usize) -> usize {
-    let HoldTimes { on, off } = law.hold;
-    let hold = if on > off { on } else { off } as usize;
+    let HoldTimes { on, off } = law.anticipation;
+    let halves = if on > off { on } else { off } as usize;
     let valve = if law.opening > law.closing {
         law.opening
     } else {
         law.closing
     } as usize;
-    let needed = delay + valve + hold.div_ceil(2) + 2;
+    let needed = delay + valve + halves.div_ceil(2) + 2;
     let lead = law.lead as usize + 1;
     if needed > lead { needed } else { lead }
 }
@@ -136,6 +136,7 @@ mod tests {
             },
             slope: 0.0,
             hold: HoldTimes { on: 7, off: 4 },
+            anticipation: HoldTimes { on: 7, off: 4 },
             budget: Budget {
                 switches: None,
                 air: None,

@@ -91,6 +91,7 @@ proptest! {
             reachable: Reachable { low: 0.0, high: 1.0 },
             slope: 0.0,
             hold: times,
+            anticipation: times,
             budget: if budget {
                 Budget {
                     switches: Some(Switches { samples_per_switch: 7, saved: 4 }),

@@ -209,6 +209,10 @@ pub const LAW: Law = model_core::control::Tracking {
         on: 18,
         off: 15,
     },
+    anticipation: model_core::control::HoldTimes {
+        on: 18,
+        off: 15,
+    },
     budget: model_core::control::budget::Budget {
         switches: Some(model_core::control::Switches {
             samples_per_switch: 25,
@@ -237,7 +241,7 @@ const _: () = {
     );
     assert!(
         LOOK_AHEAD >= checks::look_ahead(& LAW, FIRST_ARRIVAL),
-        "the law's prediction horizon is shorter than delay, valve and half a hold time together"
+        "the law's prediction horizon is shorter than delay, valve and anticipation together"
     );
 };
 /// Decisions of the law in its reference run, bit for bit as computed on the host.

@@ -186,6 +186,10 @@ pub const LAW: Law = model_core::control::Tracking {
         on: 20,
         off: 20,
     },
+    anticipation: model_core::control::HoldTimes {
+        on: 20,
+        off: 20,
+    },
     budget: model_core::control::budget::Budget {
         switches: None,
         air: None,
@@ -208,7 +212,7 @@ const _: () = {
     );
     assert!(
         LOOK_AHEAD >= checks::look_ahead(& LAW, FIRST_ARRIVAL),
-        "the law's prediction horizon is shorter than delay, valve and half a hold time together"
+        "the law's prediction horizon is shorter than delay, valve and anticipation together"
     );
 };
 /// Decisions of the law in its reference run, bit for bit as computed on the host.

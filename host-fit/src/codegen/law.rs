@@ -75,7 +75,7 @@ fn tracking(law: &Track) -> TokenStream {
     let [reference, low, high, slope] =
         [law.reference, law.reachable[0], law.reachable[1], law.slope]
             .map(|value| number(value, ""));
-    let hold = hold(law.hold);
+    let (times, anticipation) = (hold(law.hold), hold(law.anticipation()));
     let [lead, opening, closing] =
         [law.lead, law.opening, law.closing].map(Literal::u16_unsuffixed);
     let [
@@ -106,7 +106,8 @@ fn tracking(law: &Track) -> TokenStream {
             reference: #reference,
             reachable: model_core::control::Reachable { low: #low, high: #high },
             slope: #slope,
-            hold: #hold,
+            hold: #times,
+            anticipation: #anticipation,
             budget: model_core::control::budget::Budget { switches: #switches, air: #air },
             lead: #lead,
             opening: #opening,
@@ -127,7 +128,7 @@ fn tracking(law: &Track) -> TokenStream {
             );
             assert!(
                 LOOK_AHEAD >= checks::look_ahead(&LAW, FIRST_ARRIVAL),
-                "the law's prediction horizon is shorter than delay, valve and half a hold time together"
+                "the law's prediction horizon is shorter than delay, valve and anticipation together"
             );
         };
     }

@@ -12,6 +12,7 @@ use rig_line::RigFile;
 
 use super::average::{not_negative, positive};
 use super::drawings::{margin_picture, proof_picture};
+use super::load::shell_word;
 use super::time_span::TimeSpan;
 use super::tried::Tried;
 use super::{Console, check_outputs, page, rig_constants};
@@ -298,6 +299,7 @@ impl Args {
             proof,
             targets,
             not_tried: notes,
+            file: shell_word(&self.output),
         })
     }
 

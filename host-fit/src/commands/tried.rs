@@ -21,6 +21,9 @@ pub(super) struct Tried {
     pub(super) targets: Vec<TargetVerdict>,
     /// Trials that were not possible, one sentence each.
     pub(super) not_tried: Vec<String>,
+    /// The file of the law, quoted for a shell.
+    #[serde(skip)]
+    pub(super) file: String,
 }
 
 impl Tried {
@@ -87,7 +90,7 @@ impl Tried {
             .confidence(margin.map_or_else(String::new, |margin| {
                 format!("{}.", capitalised(margin.trim_end_matches('.')))
             }))
-            .next("host-fit codegen controlled.toml -o identified.rs");
+            .next(format!("host-fit codegen {} -o identified.rs", self.file));
         for line in lines.chain(self.not_tried.iter().map(String::as_str)) {
             answer.note(line);
         }

@@ -229,17 +229,18 @@ impl Positive {
                 return Err("the model has no stable steady level");
             }
         }
-        let looks = |valve: u16, hold: u32| {
-            let (valve, hold) = (usize::from(valve), hold as usize);
-            [valve + hold / 2, valve + hold.div_ceil(2)]
+        let anticipation = law.anticipation();
+        let looks = |valve: u16, halves: u32| {
+            let (valve, halves) = (usize::from(valve), halves as usize);
+            [valve + halves / 2, valve + halves.div_ceil(2)]
         };
         Ok(Self {
             off,
             on,
             hold: [law.hold.of(true), law.hold.of(false)].map(|hold| hold as usize),
             looks: [
-                looks(law.opening, law.hold.of(true)),
-                looks(law.closing, law.hold.of(false)),
+                looks(law.opening, anticipation.on),
+                looks(law.closing, anticipation.off),
             ],
             mixes,
         })

@@ -53,6 +53,11 @@ rules! {
     least_settled: f64 = 0.1, "share of its rate", "judgement";
     /// Largest correction of bias and integral.
     correction: f64 = 0.3, "share of the reachable interval", "judgement";
+    /// Anticipations that are tried in turn while the rms error on the model falls.
+    anticipations: [f64; 6] = [0.85, 0.7, 0.55, 0.4, 0.2, 0.0], "of half a shortest time", "a grid; a flow that settles within \
+         a shortest time m reaches its centre after τ·ln(2/(1 + e^(−m/τ)))";
+    /// The rms error must fall by this share.
+    anticipated: f64 = 0.005, "share of the rms error", "judgement";
     /// Switches that the budget can accumulate. With fewer than those of two pulses, a valve that was open for a
     /// long time would have to stay closed until the budget recovers.
     saved_switches: u32 = 10, "switches", "five pulses";

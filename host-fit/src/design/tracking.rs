@@ -179,6 +179,7 @@ pub fn track(model: &Model, request: &TrackRequest) -> Result<TrackDesign, Desig
             .ramp_per_s
             .map_or(0.0, |slope| slope * model.sample_period_s),
         hold,
+        anticipation: None,
         switches: None,
         air,
         lead,
@@ -224,6 +225,10 @@ pub fn track(model: &Model, request: &TrackRequest) -> Result<TrackDesign, Desig
                 (law, duty) = (slower, figures.air);
             }
         }
+    }
+    if !request.least_air {
+        law = anticipating(law, |law| Some(duty_of(law).ok()?.rms));
+        duty = duty_of(&law)?.air;
     }
     let final_figures = duty_of(&law)?;
     if final_figures.switches_per_s == 0.0 {
@@ -316,6 +321,27 @@ fn paced(law: &Track, rate: f64, duty: f64) -> Track {
         RULES.saved_switches,
     ]);
     paced
+}
+
+/// `law` with the anticipation of the least `rms` on the model. Half of the shortest times centres the ripple of a flow
+/// that moves at constant rates; a flow that settles within a shortest time moves mostly at its beginning.
+fn anticipating(law: Track, rms: impl Fn(&Track) -> Option<f64>) -> Track {
+    let hold = [law.hold.of(true), law.hold.of(false)];
+    let Some(mut least) = rms(&law) else {
+        return law;
+    };
+    let mut best = law;
+    for share in RULES.anticipations {
+        let other = Track {
+            anticipation: Some(hold.map(|hold| (share * f64::from(hold)).round() as u32)),
+            ..best.clone()
+        };
+        match rms(&other) {
+            Some(rms) if rms < (1.0 - RULES.anticipated) * least => (best, least) = (other, rms),
+            _ => break,
+        }
+    }
+    best
 }
 
 /// Half of the valve's longer hold time, samples.
@@ -465,6 +491,42 @@ pub(super) mod tests {
         assert_eq!(design.law.hold.on, 10);
         assert!((20..=25).contains(&design.law.hold.off), "{design:?}");
         assert_eq!(design.law.switches, Some([50, 10]));
+    }
+
+    /// A flow that settles within the shortest times, held at half of steady blowing: no square wave with these times
+    /// has less ripple than the one of equal parts, which swings between e^{−m/τ} times and once its upper end.
+    #[test]
+    fn the_ripple_is_least_for_times_longer_than_the_flow_takes() {
+        let (tau, shortest) = (20.0_f64, 40.0);
+        let pole = (-1.0 / tau).exp();
+        let model = Model {
+            state_lags: vec![1],
+            product_lags: Vec::new(),
+            a: vec![pole],
+            b: vec![1.0 - pole],
+            c: Vec::new(),
+            ..paper(LagConvention::OneStep)
+        };
+        let request = TrackRequest {
+            min_on_s: 0.001 * shortest,
+            min_off_s: 0.001 * shortest,
+            ..TrackRequest::holding(0.5)
+        };
+        let design = track(&model, &request).unwrap();
+        let figures = on_model(&Player::of(&model), design.law.tracking());
+        let decay = (-shortest / tau).exp();
+        // Mean square of (1 − high·e^{−t/τ}) − 1/2 over a part, high = 1/(1 + decay).
+        let high = 1.0 / (1.0 + decay);
+        let mean_square = 0.25 - high * tau / shortest * (1.0 - decay)
+            + high.powi(2) * tau / (2.0 * shortest) * (1.0 - decay.powi(2));
+        let least = mean_square.sqrt();
+        assert!(
+            (0.99..1.05).contains(&(figures.rms / least)),
+            "{} {least}",
+            figures.rms
+        );
+        assert!(figures.offset.abs() < 0.01, "{}", figures.offset);
+        assert!(design.law.anticipation.is_some());
     }
 
     #[test]

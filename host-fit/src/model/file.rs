@@ -571,6 +571,7 @@ mod tests {
             reachable: [0.0, 1.05],
             slope: 0.0,
             hold: HoldTimes { on: 10, off: 12 },
+            anticipation: Some([9, 11]),
             switches: Some([20, 10]),
             air: None,
             lead: 47,

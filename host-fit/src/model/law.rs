@@ -37,6 +37,10 @@ pub struct Track {
     /// Shortest on and off times.
     #[serde(with = "HoldTable")]
     pub hold: HoldTimes,
+    /// How far the law looks beyond the arrival of an opening and of a closing, in half samples; `None`: over half of
+    /// each shortest time.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub anticipation: Option<[u32; 2]>,
     /// Samples per switch that the valve's budget allows, and largest number of saved switches.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub switches: Option<[u32; 2]>,
@@ -95,6 +99,18 @@ pub struct Maximise {
 }
 
 impl Track {
+    /// How far the law looks beyond an arrival, half samples.
+    #[must_use]
+    pub fn anticipation(&self) -> HoldTimes {
+        match self.anticipation {
+            Some([on, off]) => HoldTimes { on, off },
+            None => HoldTimes {
+                on: self.hold.of(true),
+                off: self.hold.of(false),
+            },
+        }
+    }
+
     /// The law with numbers of type `T`.
     #[must_use]
     pub fn tracking<T: Real>(&self) -> Tracking<T> {
@@ -107,6 +123,7 @@ impl Track {
             },
             slope: number(self.slope),
             hold: self.hold,
+            anticipation: self.anticipation(),
             budget: Budget {
                 switches: self.switches.map(|[samples_per_switch, saved]| Switches {
                     samples_per_switch,

@@ -16,6 +16,10 @@ pub struct Tracking<T> {
     pub slope: T,
     /// Shortest on and off times.
     pub hold: HoldTimes,
+    /// How far the law looks beyond the arrival of an opening and of a closing, in half samples. At half of the shortest
+    /// time the ripple is centred on the reference if the flow moves at constant rates; a flow that settles within the
+    /// shortest time reaches its centre earlier.
+    pub anticipation: HoldTimes,
     /// Limits on switching and air.
     pub budget: Budget,
     /// Prediction horizon of the bias estimate, at least 1 and at most the shortest delay.
@@ -50,7 +54,7 @@ pub struct Tracking<T> {
 pub enum Unusable {
     /// A share or rate is not within 0–1, or a limit is negative or not finite.
     Constant(&'static str),
-    /// The memory for predictions has fewer samples than the delay, valve and half a hold time together.
+    /// The memory for predictions has fewer samples than the delay, valve and anticipation together.
     LookAhead,
     /// Tracking needs the full model; an averaged model (eq. 15) does not resolve single switches.
     AveragedModel,
@@ -61,7 +65,7 @@ impl fmt::Display for Unusable {
         match self {
             Self::Constant(name) => write!(f, "`{name}` of the tracking law is out of range"),
             Self::LookAhead => f.write_str(
-                "the law looks ahead over delay, valve and half a hold time, which is more samples than it can \
+                "the law looks ahead over delay, valve and anticipation, which is more samples than it can \
                  store; use shorter hold times, or a model with a longer sample period",
             ),
             Self::AveragedModel => f.write_str(

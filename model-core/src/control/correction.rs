@@ -118,6 +118,7 @@ mod tests {
         },
         slope: 0.0,
         hold: HoldTimes { on: 1, off: 1 },
+        anticipation: HoldTimes { on: 1, off: 1 },
         budget: Budget {
             switches: None,
             air: None,

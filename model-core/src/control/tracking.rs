@@ -2,10 +2,10 @@
 //!
 //! A command issued at sample k arrives at κ(k) = min{m ≥ k : m − h(ỹ_m) ≥ k}. The law predicts the flow with the
 //! model from its present estimate. The prediction contains every command already issued up to κ(k), with the delay
-//! evaluated at each sample, and continues half a hold time further with the *other* valve position. The law
-//! switches if the flow would then be on the other side of the reference. The ripple that a hold time causes is
-//! thereby centred on the reference. At a hold time of one sample this is the one-step-optimal choice u = 1 ⇔ y* −
-//! F > G/2.
+//! evaluated at each sample, and continues over the law's anticipation with the *other* valve position. The law
+//! switches if the flow would then be on the other side of the reference. With an anticipation of half a hold time, the
+//! ripple that a hold time causes is centred on the reference. At a hold time of one sample this is the one-step-optimal
+//! choice u = 1 ⇔ y* − F > G/2.
 //!
 //! Three corrections handle model errors: an observer corrects the estimate by a share of each residual, and
 //! bias and integral correct the reference.
@@ -15,7 +15,7 @@ use crate::control::ahead::{self, Foreknown};
 use crate::control::budget::{Air, Purse};
 use crate::control::constants::{Tracking, Unusable};
 use crate::control::correction::{Correction, limited};
-use crate::control::hold::Hold;
+use crate::control::hold::{Hold, HoldTimes};
 use crate::control::reference::{Unreachable, ramp};
 use crate::effect::Effect;
 use crate::history::Memory;
@@ -242,10 +242,14 @@ impl<T: Real> Tracking<T> {
         Y: Memory<T>,
         J: Memory<T>,
     {
-        let hold = self.hold.of(on);
+        let HoldTimes {
+            on: opening,
+            off: closing,
+        } = self.anticipation;
+        let halves = if on { opening } else { closing };
         let valve = u32::from(if on { self.opening } else { self.closing });
-        // Half a hold time after the arrival; for an odd one, the mean of the two neighbouring samples.
-        let (near, far) = (valve + hold / 2, valve + hold.div_ceil(2));
+        // Between two samples, their mean.
+        let (near, far) = (valve + halves / 2, valve + halves.div_ceil(2));
         let input = Input {
             command: if on { T::ONE } else { T::ZERO },
             channels,
@@ -288,7 +292,7 @@ impl<T: Real> Tracking<T> {
 
 /// Result of a look-ahead.
 struct Look<T> {
-    /// Friction half a hold time after the arrival.
+    /// Friction after the arrival and the anticipation.
     foreseen: T,
     /// Friction `lead` samples from now.
     at_lead: T,
@@ -311,7 +315,6 @@ impl<T: Copy> Look<T> {
 mod tests {
     use super::*;
     use crate::control::budget::Budget;
-    use crate::control::hold::HoldTimes;
     use crate::control::reference::Reachable;
     use crate::history::Past;
     use crate::paper::table_two;
@@ -327,6 +330,10 @@ mod tests {
             },
             slope: T::ZERO,
             hold: HoldTimes {
+                on: dwell,
+                off: dwell,
+            },
+            anticipation: HoldTimes {
                 on: dwell,
                 off: dwell,
             },

@@ -260,9 +260,12 @@ fn counts(track: &Track) -> Vec<(&'static str, u32)> {
         0
     };
     let (on, off) = (track.hold.on.max(1), track.hold.off.max(1));
+    let anticipation = track.anticipation();
     vec![
         ("LAW_HOLD_ON", on),
         ("LAW_HOLD_OFF", off),
+        ("LAW_HALF_SAMPLES_ON", anticipation.on),
+        ("LAW_HALF_SAMPLES_OFF", anticipation.off),
         ("LAW_SAMPLES_PER_SWITCH", cost),
         ("LAW_SWITCHES_CAPACITY", cost.saturating_mul(saved.max(2))),
         ("LAW_AIR_PER_MILLE", per_mille),

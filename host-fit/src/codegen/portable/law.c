@@ -50,14 +50,14 @@ struct look {
     uint32_t delay;
 };
 
-/* Predicts the flow with the valve at `on` from now, until half a hold time after the arrival of `on`. */
+/* Predicts the flow with the valve at `on` from now, until the anticipation after the arrival of `on`. */
 static struct look look_ahead(int on, const real *channels)
 {
     struct look look;
-    const uint32_t hold = on != 0 ? LAW_HOLD_ON : LAW_HOLD_OFF;
+    const uint32_t halves = on != 0 ? LAW_HALF_SAMPLES_ON : LAW_HALF_SAMPLES_OFF;
     const uint32_t valve = on != 0 ? LAW_OPENING : LAW_CLOSING;
-    const uint32_t near = valve + hold / 2u;
-    const uint32_t far = valve + (hold + 1u) / 2u;
+    const uint32_t near = valve + halves / 2u;
+    const uint32_t far = valve + (halves + 1u) / 2u;
     uint32_t i, arrived_for = 0u;
     int arrived = 0, enough = 0;
     ahead = law.model;

@@ -12,15 +12,15 @@ function law = law_at_rest()
   law.air = c.LAW_AIR_CAPACITY;
 end
 
-% Predicts the flow half a hold time after `on` arrives, and LAW_LEAD samples from now.
+% Predicts the flow over the anticipation after `on` arrives, and LAW_LEAD samples from now.
 function [foreseen, at_lead] = look_ahead(law, c, on, channels)
   if on
-    hold = c.LAW_HOLD_ON; valve = c.LAW_OPENING;
+    halves = c.LAW_HALF_SAMPLES_ON; valve = c.LAW_OPENING;
   else
-    hold = c.LAW_HOLD_OFF; valve = c.LAW_CLOSING;
+    halves = c.LAW_HALF_SAMPLES_OFF; valve = c.LAW_CLOSING;
   end
-  near = valve + floor(hold / 2);
-  far = valve + ceil(hold / 2);
+  near = valve + floor(halves / 2);
+  far = valve + ceil(halves / 2);
   ahead = law.model;
   foreseen = ahead.y(1);
   at_lead = foreseen;

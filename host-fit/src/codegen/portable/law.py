@@ -16,10 +16,10 @@ class Law:
         self.estimate = self.foreseen = self.residual = 0.0
 
     def _look_ahead(self, on, channels):
-        """Predicts the flow half a hold time after `on` arrives, and LAW_LEAD samples from now."""
-        hold = LAW_HOLD_ON if on else LAW_HOLD_OFF
+        """Predicts the flow over the anticipation after `on` arrives, and LAW_LEAD samples from now."""
+        halves = LAW_HALF_SAMPLES_ON if on else LAW_HALF_SAMPLES_OFF
         valve = LAW_OPENING if on else LAW_CLOSING
-        near, far = valve + hold // 2, valve + (hold + 1) // 2
+        near, far = valve + halves // 2, valve + (halves + 1) // 2
         ahead = self.model.copy()
         foreseen = at_lead = ahead.y[-1]
         arrived, arrived_for = False, 0

@@ -264,7 +264,8 @@ pub(crate) fn trial_rows(proof: &Proof) -> Vec<Vec<String>> {
     let row = |name: &str, likely: String, kept: &str, f: &Figures, steady: String| {
         let mut cells = vec![name.to_owned(), likely, kept.to_owned()];
         cells.extend([f.mean, f.rms].map(|v| format!("{v:.3}")));
-        cells.push(format!("{:+.3}", f.offset));
+        // Without the sign of a rounded −0.
+        cells.push(format!("{:+.3}", (1e3 * f.offset).round() / 1e3 + 0.0));
         cells.push(format!("{:.3}", f.peak_to_peak));
         cells.push(format!("{:.1}", f.switches_per_s));
         cells.push(format!("{:.3}", f.air));
@@ -320,7 +321,11 @@ fn case_table(proof: &Proof) -> String {
         else {
             continue;
         };
-        let name: String = name.chars().take(44).collect();
+        // The page and `--json` have the parameters of every plant.
+        let name = match name.split_once(" (") {
+            Some((short, _)) if name.chars().count() > 44 => short,
+            _ => name,
+        };
         text.push_str(&format!(
             "\n{name:<44} {likely:>7} {mean:>6} {rms:>6} {offset:>7} {p2p:>6} {switches:>6} {air:>6} {settling:>7} {steady:>6}  {kept}"
         ));

@@ -16,8 +16,9 @@ use super::drawings::{experiment_picture, ladder_picture, margin_picture, proof_
 use super::page_parts::{Run, Stretch, card, checks, stretch_picture, worst_stretch};
 use super::tried::Tried;
 use super::words::{
-    SIDE_BY_SIDE, TRIALS, Words, describe, ladder_rows, named_first, ranking_rows, role_name,
-    score_rows, side_by_side_rows, trial_caption, trial_rows,
+    PARAMETERS, SIDE_BY_SIDE, TRIALS, Words, describe, dropped_terms, ladder_rows, named_first,
+    parameter_rows, ranking_rows, role_name, score_rows, side_by_side_rows, trial_caption,
+    trial_rows,
 };
 
 /// The page of a comparison, made by `command`.
@@ -114,8 +115,18 @@ pub(crate) fn extension(
         .chain([run("after", model, &after.runs)])
         .collect();
     let worst = lead(&mut report, &found.answer, None, &records, &pairs(&runs));
+    report.section("The model");
+    report.paragraph(&describe(model));
+    if let Some(dropped) = dropped_terms(found) {
+        report.paragraph(&dropped);
+    }
+    if !found.parameters.is_empty() {
+        let columns = PARAMETERS.map(Column::Text);
+        report.table("", &columns, &parameter_rows(&found.parameters));
+    }
     compared(&mut report, &records, &runs, after, worst);
-    every_record(&mut report, model, &after.scores);
+    report.section("Every record");
+    report_scores(&mut report, &after.scores);
     provenance(&mut report, set, model.training.seed, &command_line());
     report.html()
 }

@@ -164,7 +164,8 @@ fn title(canvas: &mut Canvas, panel: &Panel, view: &FailureView<'_>) {
         canvas.text(Words::new(13.5, colour), below, &text);
     }
     let name = match view.unit {
-        "" => view.coordinate.clone(),
+        // As "level of y" has it.
+        unit if view.coordinate.ends_with(unit) => view.coordinate.clone(),
         unit => format!("{} ({unit})", view.coordinate),
     };
     let need = BOLD * text_width(&name, 14.5);

@@ -226,24 +226,28 @@ pub(crate) fn side_by_side_rows(found: &SideBySide) -> Vec<Vec<String>> {
 impl Words for Extension {
     fn words(&self) -> String {
         let mut told = vec![self.answer.words(), String::new(), describe(&self.model)];
-        if !self.dropped.is_empty() {
-            told.push(format!(
-                "No longer needed with {}: {}.",
-                self.effects.join(" and "),
-                self.dropped.join(", ")
-            ));
-        }
+        told.extend(dropped_terms(self));
         if !self.parameters.is_empty() {
-            told.push(parameter_table(&self.parameters));
+            let rows = parameter_rows(&self.parameters);
+            told.push(aligned(&PARAMETERS, &rows, 2));
         }
         told.push(changes(self.scores_before.as_ref(), &self.scores_after));
         lines(told)
     }
 }
 
-/// Fitted parameters as an aligned table.
-fn parameter_table(parameters: &BTreeMap<String, ParameterEstimate>) -> String {
-    let rows: Vec<Vec<String>> = parameters
+/// Terms of the given model that are no longer needed.
+pub(crate) fn dropped_terms(found: &Extension) -> Option<String> {
+    let (effects, dropped) = (found.effects.join(" and "), found.dropped.join(", "));
+    (!dropped.is_empty()).then(|| format!("No longer needed with {effects}: {dropped}."))
+}
+
+/// Columns of [`parameter_rows`].
+pub(crate) const PARAMETERS: [&str; 4] = ["parameter", "unit", "value", "95 % interval"];
+
+/// A row for each fitted parameter.
+pub(crate) fn parameter_rows(parameters: &BTreeMap<String, ParameterEstimate>) -> Vec<Vec<String>> {
+    parameters
         .iter()
         .map(|(name, p)| {
             vec![
@@ -253,8 +257,7 @@ fn parameter_table(parameters: &BTreeMap<String, ParameterEstimate>) -> String {
                 format!("{} … {}", short(p.low), short(p.high)),
             ]
         })
-        .collect();
-    aligned(&["parameter", "unit", "value", "95 % interval"], &rows, 2)
+        .collect()
 }
 
 /// RMSE before → after → noise level, per record and in total.

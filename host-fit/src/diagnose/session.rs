@@ -169,16 +169,18 @@ impl Session<'_> {
             &found.best
         };
         let certificates = self.certificates(subject, &sets, &others, &found);
-        // An effect is named only if no model without it has more evidence.
-        let contradicted = order.iter().take(way.proven).any(|spec| {
+        // An effect is named only if no model without it has more evidence, and only before less important ones.
+        let is_evident = |spec: &&&'static Spec| {
             let certificate = certificates.get(spec.name);
-            certificate.is_some_and(|certificate| certificate.evidence_nats < 0.0)
-        });
-        let (verdict, claims) = match claims && contradicted {
+            certificate.is_none_or(|certificate| certificate.evidence_nats >= 0.0)
+        };
+        let evident = order.iter().take(way.proven).take_while(is_evident);
+        let proven = if claims { evident.count() } else { 0 };
+        let (verdict, claims) = match claims && proven == 0 {
             true => (Verdict::PartlyExplained, false),
             false => (verdict, claims),
         };
-        let named_sets = sets.iter().take(if claims { way.proven } else { 0 });
+        let named_sets = sets.iter().take(proven);
         let likelihood = claims.then(|| Likelihood::of(judge, last.judged.model()));
         let likelihood = likelihood.flatten();
         let posterior = |set: &Set| {
@@ -211,7 +213,6 @@ impl Session<'_> {
         };
         let separation = self.separation(&model, alternatives, separated);
         let mut missing: Vec<String> = order.iter().map(|spec| spec.name.to_owned()).collect();
-        let proven = if claims { way.proven } else { 0 };
         let stand_ins = missing.split_off(proven);
         sets.truncate(proven);
         let is_certified = |name: &String| {

@@ -83,7 +83,8 @@ impl Session<'_> {
         // If the noise level is known, the validation records decide as well.
         let scatter = self.judge().noise_source == NoiseSource::Scatter;
         let largest = (1.0 + RULES.worthwhile) * best.judged.rmse();
-        let may_stand = |of: &Hypothesis| scatter || of.judged.rmse() <= largest;
+        let may_stand =
+            |of: &Hypothesis| (scatter || of.judged.rmse() <= largest) && !of.reaches_a_bound();
         let mut own = evidence(&best);
         loop {
             let effects = best.terms.iter().enumerate();
@@ -137,7 +138,7 @@ impl Session<'_> {
                 let mut terms: Vec<Term> = kept;
                 terms.append(&mut found.terms);
                 found.terms = terms;
-                (found.judged.rmse() <= enough).then_some(found)
+                (found.judged.rmse() <= enough && !found.reaches_a_bound()).then_some(found)
             });
             match lesser.min_by(|a, b| a.score().total_cmp(&b.score())) {
                 Some(lesser) => best = lesser,

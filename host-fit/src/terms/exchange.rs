@@ -221,6 +221,7 @@ impl Search<'_> {
         let lesser = self.less(hypothesis, index, &brief.model)?;
         let p = p_value(&lesser.judged.held_out, &hypothesis.judged.held_out);
         let loss = (lesser.judged.rmse() / own).ln();
-        (loss < price(cost) || p > RULES.level).then_some(lesser)
+        let needless = loss < price(cost) || p > RULES.level;
+        (needless && !lesser.reaches_a_bound()).then_some(lesser)
     }
 }

@@ -237,7 +237,7 @@ fn bent_and_kept(fitted: &Fit, terms: Vec<Term>) -> (Vec<Term>, Vec<Term>) {
 
 /// Whether an effect is at a bound of its card's range: it is then a surrogate. Delay laws are exempt,
 /// because levels that y hardly visits leave their parameters undetermined.
-fn at_a_bound(model: &Model, term: &Term) -> bool {
+pub(super) fn at_a_bound(model: &Model, term: &Term) -> bool {
     let spec = match term {
         Term::Effect { spec, .. } | Term::Path { spec, .. } => spec,
         _ => return false,

@@ -2,6 +2,7 @@
 
 use super::RULES;
 use super::effort::Effort;
+use super::follow::at_a_bound;
 use super::grid::hides;
 use super::judge::{Judge, Judged};
 use super::proposal::Proposal;
@@ -63,6 +64,12 @@ impl Hypothesis {
     #[must_use]
     pub fn is_bare(&self) -> bool {
         self.terms.iter().all(|term| term.effect().is_none())
+    }
+
+    /// Whether a term is at a bound of its range. Such a term imitates another, and is no result.
+    pub(crate) fn reaches_a_bound(&self) -> bool {
+        let model = self.judged.model();
+        self.terms.iter().any(|term| at_a_bound(model, term))
     }
 
     /// Number of parameters of the terms, as the penalty counts them.

@@ -18,8 +18,9 @@ pub struct Figures {
     pub switches_per_s: f64,
     /// Share of time with the valve open: the air used, relative to steady blowing.
     pub air: f64,
-    /// Time until the mean of the friction over whole cycles of the valve, at least 250 samples, stays within 5 % of the last reference for 1000 samples
-    /// (in each case at least as many milliseconds, [`span`]); `None` if it never does.
+    /// Time until the mean of the friction over whole cycles of the valve, at least 250 samples, stays within 5 % of
+    /// the last reference for 1000 samples (in each case at least as many milliseconds, [`span`]); `None` if it never
+    /// does.
     pub settling_s: Option<f64>,
 }
 

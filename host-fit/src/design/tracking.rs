@@ -226,11 +226,12 @@ pub fn track(model: &Model, request: &TrackRequest) -> Result<TrackDesign, Desig
             }
         }
     }
+    // A pace that saves air has its ripple on purpose.
     if !request.least_air {
         law = anticipating(law, |law| Some(duty_of(law).ok()?.rms));
-        duty = duty_of(&law)?.air;
     }
     let final_figures = duty_of(&law)?;
+    duty = final_figures.air;
     if final_figures.switches_per_s == 0.0 {
         let ms = |samples: u32| (1e6 * f64::from(samples) * period_s).round() / 1e3;
         remarks.push(format!(

@@ -169,13 +169,9 @@ impl Session<'_> {
             &found.best
         };
         let certificates = self.certificates(subject, &sets, &others, &found);
-        // An effect is named only if no model without it has more evidence, and only before less important ones.
-        let is_evident = |spec: &&&'static Spec| {
-            let certificate = certificates.get(spec.name);
-            certificate.is_none_or(|certificate| certificate.evidence_nats >= 0.0)
-        };
-        let evident = order.iter().take(way.proven).take_while(is_evident);
-        let proven = if claims { evident.count() } else { 0 };
+        let nats = |spec: &&'static Spec| Some(certificates.get(spec.name)?.evidence_nats);
+        let evidence: Vec<Option<f64>> = order.iter().take(way.proven).map(nats).collect();
+        let proven = if claims { evident(&evidence) } else { 0 };
         let (verdict, claims) = match claims && proven == 0 {
             true => (Verdict::PartlyExplained, false),
             false => (verdict, claims),
@@ -333,6 +329,14 @@ impl Session<'_> {
     }
 }
 
+/// How many effects, the most important first, are named by the `evidence` of each: nats by which the model has more than
+/// the best model without it, `None` if that cannot be computed. An effect without evidence, and the less important ones
+/// after it, are surrogates.
+fn evident(evidence: &[Option<f64>]) -> usize {
+    let has = |nats: &&Option<f64>| nats.is_none_or(|nats| nats >= 0.0);
+    evidence.iter().take_while(has).count()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -340,6 +344,14 @@ mod tests {
     use crate::terms::Bench;
     use model_core::effects::spec;
     use std::sync::atomic::AtomicBool;
+
+    #[test]
+    fn an_effect_without_evidence_takes_no_name_but_its_own() {
+        assert_eq!(evident(&[Some(3829.0), Some(-118.0)]), 1);
+        assert_eq!(evident(&[Some(-1.0), Some(50.0)]), 0);
+        assert_eq!(evident(&[Some(0.0), None]), 2);
+        assert_eq!(evident(&[]), 0);
+    }
 
     /// A drift is hidden. A vortex in the same model has an amplitude whose interval contains 0. The uncertainty
     /// must be attributed to the vortex.

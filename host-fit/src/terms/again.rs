@@ -2,8 +2,9 @@
 //! two reservoirs, two time constants of a drift, two lags of a film.
 
 use super::RULES;
+use super::hypothesis::Hypothesis;
 use super::judge::Judged;
-use super::search::{Hypothesis, Search};
+use super::search::Search;
 use crate::fit::{Fit, FitOptions, fit, starts};
 use crate::order;
 use crate::parallel;

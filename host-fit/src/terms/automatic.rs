@@ -3,9 +3,10 @@
 
 use super::bench::Bench;
 use super::evidence::p_value;
+use super::hypothesis::Hypothesis;
 use super::judge::{Judge, Judged};
 use super::linear::{self, second_order};
-use super::search::{Found, Hypothesis, Search};
+use super::search::{Found, Search};
 use super::settled::{Settled, settled};
 use super::term::{Term, take_delay_law};
 use super::{Known, RULES};

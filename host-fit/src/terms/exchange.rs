@@ -4,8 +4,9 @@
 use super::RULES;
 use super::effort::Effort;
 use super::evidence::{HeldOut, p_value};
+use super::hypothesis::{Hypothesis, score};
 use super::screen::Screen;
-use super::search::{Hypothesis, Search, count_effects, score};
+use super::search::{Search, count_effects};
 use super::table::Table;
 use super::term::Term;
 use crate::fit::{Fit, FitOptions, fit};

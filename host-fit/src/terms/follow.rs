@@ -3,9 +3,10 @@
 
 use super::RULES;
 use super::grid::{hides, longest_lag};
+use super::hypothesis::Hypothesis;
 use super::proposal::Proposal;
 use super::screen::Screen;
-use super::search::{Hypothesis, Search};
+use super::search::Search;
 use super::table::path_terms;
 use super::term::Term;
 use crate::fit::{Fit, FitOptions, fit, settle_fixed_delay, starts};
@@ -231,28 +232,9 @@ fn moved(model: &Model, terms: &[Term], steps: &[i32], longest: u16) -> (Model, 
 
 /// Terms at a bound of their range in a fit, and the others.
 fn bent_and_kept(fitted: &Fit, terms: Vec<Term>) -> (Vec<Term>, Vec<Term>) {
-    let is_bent = |term: &Term| at_a_bound(&fitted.model, term);
-    terms.into_iter().partition(is_bent)
-}
-
-/// Whether an effect is at a bound of its card's range: it is then a surrogate. Delay laws are exempt,
-/// because levels that y hardly visits leave their parameters undetermined.
-pub(super) fn at_a_bound(model: &Model, term: &Term) -> bool {
-    let spec = match term {
-        Term::Effect { spec, .. } | Term::Path { spec, .. } => spec,
-        _ => return false,
-    };
-    let added = model.effects.iter().find(|added| added.name == spec.name);
-    let values = added.map_or(&[][..], |added| &added.parameters);
-    values.iter().zip(spec.parameters).any(|(value, card)| {
-        let place = |x: f64| if card.is_logarithmic() { x.ln() } else { x };
-        let (low, high) = (place(card.low), place(card.high));
-        let near = RULES.bound * (high - low);
-        // An amplitude may be small.
-        let low_end = card.is_logarithmic() || card.low != 0.0;
-        let at_low = low_end && place(*value) < low + near;
-        card.low < card.high && (place(*value) > high - near || at_low)
-    })
+    terms
+        .into_iter()
+        .partition(|term| term.is_at_a_bound(&fitted.model))
 }
 
 #[cfg(test)]

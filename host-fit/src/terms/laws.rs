@@ -1,6 +1,7 @@
 //! Delay laws of the catalogue as parts of the base model.
 
-use super::search::{Hypothesis, Search};
+use super::hypothesis::Hypothesis;
+use super::search::Search;
 use crate::fit::rows;
 use crate::parallel;
 use model_core::effect::Place;

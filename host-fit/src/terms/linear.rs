@@ -1,7 +1,7 @@
 //! First order, second order and ARX(2,2) as models of this crate, and the second order from which a search starts.
 
+use super::hypothesis::Hypothesis;
 use super::judge::{Judge, size};
-use super::search::Hypothesis;
 use super::term::Term;
 use crate::baseline::{Arx, Baselines, Recursion};
 use crate::data::Record;

@@ -109,6 +109,25 @@ impl Term {
         }
     }
 
+    /// Whether the term is at a bound of its card's range in `model`: it is then a surrogate. Delay laws are exempt,
+    /// because levels that y hardly visits leave their parameters undetermined.
+    pub(super) fn is_at_a_bound(&self, model: &Model) -> bool {
+        let (Self::Effect { spec, .. } | Self::Path { spec, .. }) = self else {
+            return false;
+        };
+        let added = model.effects.iter().find(|added| added.name == spec.name);
+        let values = added.map_or(&[][..], |added| &added.parameters);
+        values.iter().zip(spec.parameters).any(|(value, card)| {
+            let place = |x: f64| if card.is_logarithmic() { x.ln() } else { x };
+            let (low, high) = (place(card.low), place(card.high));
+            let near = RULES.bound * (high - low);
+            // An amplitude may be small.
+            let low_end = card.is_logarithmic() || card.low != 0.0;
+            let at_low = low_end && place(*value) < low + near;
+            card.low < card.high && (place(*value) > high - near || at_low)
+        })
+    }
+
     /// The lag, if the term is a movable one.
     #[must_use]
     pub fn lag(&self) -> Option<u16> {

@@ -242,7 +242,7 @@ fn hidden_effect(
         .fold("Details of part 2: candidates, where the model fails, residual tests, every record");
     finding_details(report, &found.model, &set, &finding, worst);
     report.end_fold();
-    let svg = ladder_picture(&finding.diagnosis, &set);
+    let svg = ladder_picture(&finding.diagnosis);
     write_atomic(&out.join("ladder.svg"), |file| {
         file.write_all(svg.as_bytes())
     })?;

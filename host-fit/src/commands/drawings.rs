@@ -37,7 +37,7 @@ pub(crate) fn overlays(records: &[Record], runs: &[(&str, &[Vec<f64>])]) -> Vec<
 }
 
 /// The validation error step by step, as a picture.
-pub(crate) fn ladder_picture(diagnosis: &Diagnosis, set: &DataSet) -> Picture {
+pub(crate) fn ladder_picture(diagnosis: &Diagnosis) -> Picture {
     let finite = diagnosis
         .ladder
         .iter()
@@ -50,7 +50,7 @@ pub(crate) fn ladder_picture(diagnosis: &Diagnosis, set: &DataSet) -> Picture {
         .collect();
     let records: [LadderRecord<'_>; 0] = [];
     ladder(&Ladder {
-        title: set.title.as_deref().unwrap_or("Validation error"),
+        title: "Validation error, step by step",
         y_unit: "y",
         steps: &steps,
         records: &records,

@@ -16,7 +16,7 @@ use super::drawings::{experiment_picture, ladder_picture, margin_picture, proof_
 use super::page_parts::{Run, Stretch, card, checks, stretch_picture, worst_stretch};
 use super::tried::Tried;
 use super::words::{
-    PARAMETERS, SIDE_BY_SIDE, TRIALS, Words, describe, dropped_terms, ladder_rows, named_first,
+    PARAMETERS, SIDE_BY_SIDE, TRIALS, Words, describe, dropped_terms, ladder_caption, ladder_rows, named_first,
     parameter_rows, ranking_rows, role_name, score_rows, side_by_side_rows, trial_caption,
     trial_rows,
 };
@@ -191,7 +191,7 @@ pub(crate) fn finding_lead(
     let mut runs: Vec<(&str, &[Vec<f64>])> = Vec::new();
     runs.extend(found.runs_before.as_deref().map(|runs| ("as given", runs)));
     runs.extend(found.runs.as_deref().map(|runs| (after_label(found), runs)));
-    let ladder = ladder_picture(&found.diagnosis, set);
+    let ladder = ladder_picture(&found.diagnosis);
     let falling = (found.diagnosis.ladder.len() > 1).then_some(&ladder);
     lead(report, &found.answer, falling, &records, &runs)
 }
@@ -285,7 +285,11 @@ pub(crate) fn discovery_details(
     worst: Option<Stretch>,
 ) {
     report.section("Validation error, step by step");
-    report.table("", &LADDER, &ladder_rows(&found.discovery.ladder));
+    report.table(
+        ladder_caption(&found.discovery.ladder),
+        &LADDER,
+        &ladder_rows(&found.discovery.ladder),
+    );
     for term in &found.discovery.terms {
         report.section(&format!("{} by {}", term.changes, term.coordinate));
         report.figure(
@@ -591,7 +595,11 @@ pub(super) fn failures_picture(failures: &Failures) -> Picture {
 fn report_candidates(report: &mut Report, found: &Finding) {
     let diagnosis = &found.diagnosis;
     report.section("Validation error, step by step");
-    report.table("", &LADDER, &ladder_rows(&diagnosis.ladder));
+    report.table(
+        ladder_caption(&diagnosis.ladder),
+        &LADDER,
+        &ladder_rows(&diagnosis.ladder),
+    );
     if !diagnosis.ranking.is_empty() {
         report.section("Candidates");
         report.figure(

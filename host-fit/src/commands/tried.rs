@@ -101,7 +101,9 @@ impl Tried {
     pub(super) fn verdict(&self) -> String {
         let decide = self.proof.cases.iter().filter(|case| case.group.decides());
         let (decide, lost) = (decide.count(), self.proof.lost());
-        let mut text = if lost.is_empty() {
+        let mut text = if lost.is_empty() && decide == 1 {
+            "attachment is kept in the one deciding trial".to_owned()
+        } else if lost.is_empty() {
             format!("attachment is kept in all {decide} deciding trials")
         } else {
             format!(

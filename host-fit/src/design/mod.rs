@@ -23,4 +23,5 @@ pub use possible::{PossibleFlow, possible_flows};
 pub use proof::{Case, CaseGroup, Proof, Trial, Trials, judged, prove, prove_pulses, run_law};
 pub use rules::{RULES, Rules};
 pub use steady::{Steady, steady, time_constants};
+pub(crate) use tracking::held;
 pub use tracking::{TrackDesign, TrackRequest, track};

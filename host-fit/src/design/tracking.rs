@@ -80,12 +80,17 @@ pub struct TrackDesign {
     pub remarks: Vec<String>,
 }
 
-/// Designs the law that holds `request.target` on `model`.
-///
-/// # Errors
-/// [`DesignError`]: a reference out of reach (with the interval), a model that
-/// does not settle, is averaged or starts in mid-run, an air budget that is too small.
-pub fn track(model: &Model, request: &TrackRequest) -> Result<TrackDesign, DesignError> {
+/// What on/off blowing can hold on a model.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Held {
+    natural: Steady,
+    blown: Steady,
+    /// The open interval of friction between both.
+    pub(crate) reachable: Reachable<f64>,
+}
+
+/// The levels that on/off blowing can hold on `model`; [`DesignError`] if no law can be designed for any level.
+pub(crate) fn held(model: &Model) -> Result<Held, DesignError> {
     check(model)?;
     if model.averaging.averaged_model {
         return Err(Unusable::AveragedModel.into());
@@ -106,6 +111,24 @@ pub fn track(model: &Model, request: &TrackRequest) -> Result<TrackDesign, Desig
         },
         high: blown.friction,
     };
+    Ok(Held {
+        natural,
+        blown,
+        reachable,
+    })
+}
+
+/// Designs the law that holds `request.target` on `model`.
+///
+/// # Errors
+/// [`DesignError`]: a reference out of reach (with the interval), a model that
+/// does not settle, is averaged or starts in mid-run, an air budget that is too small.
+pub fn track(model: &Model, request: &TrackRequest) -> Result<TrackDesign, DesignError> {
+    let Held {
+        natural,
+        blown,
+        reachable,
+    } = held(model)?;
     reachable.check(request.target)?;
     let mut remarks = Vec::new();
     for (modulus, valve) in [(natural.modulus, "closed"), (blown.modulus, "open")] {

@@ -3,6 +3,7 @@
 use serde::{Serialize, Serializer};
 
 use super::prepared::prepared;
+use super::design::command_after;
 use super::{Answer, Beside, StepError, check_period, level};
 use crate::data::DataSet;
 use crate::indicators::{Scores, score};
@@ -122,7 +123,7 @@ fn compared_on(model: &Model, prepared: &Preparation) -> Result<Comparison, Step
     let failures = where_it_fails(model, &records)?;
     Ok(Comparison {
         words: failures.describe(),
-        answer: level::compared(&scores, &failures, &records, &runs),
+        answer: level::compared(|| command_after(model), &scores, &failures, &records, &runs),
         beside: Beside::of(&records),
         scores,
         failures,

@@ -7,7 +7,7 @@ use super::{StepError, check_period};
 use crate::data::DataSet;
 use crate::design::{
     DesignError, Margin, MaximiseRequest, Optimum, PossibleFlow, Proof, RULES, TrackDesign,
-    TrackRequest, Trial, Trials, margin, maximise, possible_flows, prove, prove_pulses, track,
+    TrackRequest, Trial, Trials, held, margin, maximise, possible_flows, prove, prove_pulses, track,
 };
 use crate::fit::RULES as FIT;
 use crate::model::{Law, Model};
@@ -313,6 +313,27 @@ pub struct TargetVerdict {
     pub reason: Option<String>,
 }
 
+/// A level at `share` of an interval, to two digits of the interval.
+fn level_within([low, high]: [f64; 2], share: f64) -> f64 {
+    let decimals = (1.0 - (high - low).log10().floor()).clamp(0.0, 9.0) as usize;
+    let exact = low + share * (high - low);
+    format!("{exact:.decimals$}").parse().unwrap_or(exact)
+}
+
+/// The command that follows a finished model: a law that holds the middle of the reachable interval, or the export of
+/// the model if no law can be designed from it.
+pub(super) fn command_after(model: &Model) -> String {
+    let units = units_of_order_one(model);
+    match held(&units.model_in(model)) {
+        Ok(held) => {
+            let ends = [held.reachable.low, held.reachable.high];
+            let target = level_within(ends.map(|y| y * units.y + units.zero), 0.5);
+            format!("host-fit design model.toml DATASET --target {target} -o controlled.toml")
+        }
+        Err(_) => "host-fit codegen model.toml --lang python -o identified.py".into(),
+    }
+}
+
 /// The targets over the reachable interval that pass, with `request` otherwise unchanged.
 #[must_use]
 pub fn passing_targets(
@@ -326,10 +347,7 @@ pub fn passing_targets(
     let [low, high] = reachable;
     let verdict = |step: u32| {
         let share = f64::from(step) / f64::from(steps);
-        // Two digits of the interval are enough for a choice.
-        let decimals = (1.0 - (high - low).log10().floor()).clamp(0.0, 9.0) as usize;
-        let exact = low + share * (high - low);
-        let target = format!("{exact:.decimals$}").parse().unwrap_or(exact);
+        let target = level_within([low, high], share);
         let request = DesignRequest::Track(TrackRequest { target, ..*request });
         let reason = match design(model, &request) {
             Ok(design) => {

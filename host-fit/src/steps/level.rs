@@ -40,8 +40,9 @@ fn residual_test((_, cross): &(Correlation, Correlation)) -> String {
     )
 }
 
-/// The answer of a comparison.
+/// The answer of a comparison; `finished` is the next command if no error exceeds the noise level.
 pub(super) fn compared(
+    finished: impl Fn() -> String,
     scores: &Scores,
     failures: &Failures,
     records: &[Record],
@@ -59,7 +60,7 @@ pub(super) fn compared(
         .next("host-fit diagnose model.toml DATASET --report diagnosis.html")
     } else {
         Answer::new(Tone::Good, format!("the {error} is at the noise level"))
-            .next("host-fit design model.toml --goal maximise -o controlled.toml")
+            .next(finished())
     };
     answer
         .evidence(format!(

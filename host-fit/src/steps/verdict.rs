@@ -1,5 +1,6 @@
 //! The answer of a diagnosis, in words.
 
+use super::design::command_after;
 use super::symptom::{meant, shown};
 use super::{Answer, Tone};
 use crate::data::Plant;
@@ -148,7 +149,7 @@ fn finding(diagnosis: &Diagnosis, plant: Plant) -> Answer {
             .confidence(
                 "No candidate of the catalogue lowers the error significantly and by more than additional lags do.",
             )
-            .next("host-fit design model.toml --goal maximise -o controlled.toml"),
+            .next(command_after(&diagnosis.model)),
         Verdict::EffectMissing => {
             let named = [diagnosis.missing.as_slice(), &diagnosis.stand_ins].concat();
             Answer::new(Tone::Finding, claim(diagnosis, plant))

@@ -290,9 +290,22 @@ pub(crate) fn trial_rows(proof: &Proof) -> Vec<Vec<String>> {
     cases.chain([last]).collect()
 }
 
+/// Whether the table of a terminal shows this trial: the model's, the losses, and of each likelihood the largest error.
+fn is_shown(case: &Case, proof: &Proof) -> bool {
+    let kind = |case: &Case| (case.group.decides(), case.group == CaseGroup::Unseen);
+    let rms = case.figures.rms;
+    let mut alike = proof.cases.iter().filter(|other| kind(other) == kind(case));
+    !case.kept
+        || case.group == CaseGroup::Model
+        || !alike.any(|other| other.figures.rms > rms && other.group != CaseGroup::Model)
+}
+
+/// The most characters of a trial's name in the table of a terminal.
+const NAME: usize = 44;
+
 fn case_table(proof: &Proof) -> String {
     let mut text = format!(
-        "{:<44} {:>7} {:>6} {:>6} {:>7} {:>6} {:>6} {:>6} {:>7} {:>6}  attachment",
+        "{:<NAME$} {:>7} {:>6} {:>6} {:>7} {:>6} {:>6} {:>6} {:>7} {:>6}  attachment",
         judged_interval(proof),
         "likely",
         "mean",
@@ -304,7 +317,10 @@ fn case_table(proof: &Proof) -> String {
         "settle",
         "steady"
     );
-    for cells in trial_rows(proof) {
+    let shown = proof.cases.iter().map(|case| is_shown(case, proof));
+    let omitted = shown.clone().filter(|shown| !shown).count();
+    // The reference run is the last row.
+    for (cells, shown) in trial_rows(proof).iter().zip(shown.chain([true])) {
         let [
             name,
             likely,
@@ -321,16 +337,29 @@ fn case_table(proof: &Proof) -> String {
         else {
             continue;
         };
+        if !shown {
+            continue;
+        }
         // The page and `--json` have the parameters of every plant.
         let name = match name.split_once(" (") {
-            Some((short, _)) if name.chars().count() > 44 => short,
+            Some((short, _)) if name.chars().count() > NAME => short,
+            _ => name,
+        };
+        let name = match name.rsplit_once(',') {
+            Some((short, _)) if name.chars().count() > NAME => short,
             _ => name,
         };
         text.push_str(&format!(
-            "\n{name:<44} {likely:>7} {mean:>6} {rms:>6} {offset:>7} {p2p:>6} {switches:>6} {air:>6} {settling:>7} {steady:>6}  {kept}"
+            "\n{name:<NAME$} {likely:>7} {mean:>6} {rms:>6} {offset:>7} {p2p:>6} {switches:>6} {air:>6} {settling:>7} {steady:>6}  {kept}"
         ));
     }
     text.push('\n');
     text.push_str(DECIDING);
+    text.push('.');
+    if omitted > 0 {
+        text.push_str(&format!(
+            " {omitted} more trials keep attachment with smaller errors; `--report` and `--json` have all."
+        ));
+    }
     text
 }

@@ -69,7 +69,22 @@ pub(crate) fn ladder_rows(ladder: &[Rung]) -> Vec<Vec<String>> {
 /// The ladder of validation errors as an aligned table.
 fn ladder_table(ladder: &[Rung]) -> String {
     let head = ["validation error, step by step", "RMSE", "FIT %", "noise"];
-    aligned(&head, &ladder_rows(ladder), 1)
+    let table = aligned(&head, &ladder_rows(ladder), 1);
+    match ladder_caption(ladder) {
+        "" => table,
+        caption => format!("{table}\n{caption}"),
+    }
+}
+
+/// Why the error of the second step is larger than that of the given model; empty if it is not.
+pub(crate) fn ladder_caption(ladder: &[Rung]) -> &'static str {
+    match ladder {
+        [given, next, _, ..] if next.validate_rmse > given.validate_rmse => {
+            "The second step leaves out lags and terms of the given model that could hide an effect; the error is \
+             therefore larger there."
+        }
+        _ => "",
+    }
 }
 
 /// `name value unit (low … high)`, or that it is not identifiable: its interval spans its whole range, or a factor

@@ -5,7 +5,7 @@ mod design;
 mod finding;
 
 pub(crate) use design::{TRIALS, trial_caption, trial_rows};
-pub(crate) use finding::{ladder_rows, named_first, ranking_rows};
+pub(crate) use finding::{ladder_caption, ladder_rows, named_first, ranking_rows};
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;

@@ -1,7 +1,7 @@
 //! Results as pictures.
 
 use closed_loop::Trace;
-use host_fit::data::{DataSet, Record};
+use host_fit::data::Record;
 use host_fit::design::{Margin, Proof};
 use host_fit::diagnose::Diagnosis;
 use host_fit::experiment::Separation;

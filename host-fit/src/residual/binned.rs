@@ -75,8 +75,8 @@ pub(super) fn coordinates(source: &Source<'_>) -> Vec<Binned> {
         add(FailureCoordinate::LevelOfU, Folds::Blocks);
         add(FailureCoordinate::RateOfY, Folds::Blocks);
     }
-    for window_s in RULES.windows_s {
-        let samples = window_samples(window_s, period);
+    for samples in RULES.windows {
+        let window_s = samples as f64 * period;
         if source.records.iter().any(|r| r.len() > 2 * samples) {
             let coordinate = if on_off {
                 FailureCoordinate::Blowing { window_s }

@@ -68,16 +68,16 @@ impl FailureCoordinate {
     }
 
     /// Whether the coordinate changes more slowly than y, so that the error may be a coordinate-dependent
-    /// gain times y.
+    /// gain times y; `period_s` is the sample period.
     #[must_use]
-    pub fn is_slow(&self) -> bool {
+    pub fn is_slow(&self, period_s: f64) -> bool {
         match self {
             Self::TimeInRecord
             | Self::Channel(_)
             | Self::PulseNumber
             | Self::PulseInCycle { .. } => true,
             Self::Blowing { window_s } | Self::MeanInput { window_s } => {
-                *window_s >= RULES.slow_window_s
+                (*window_s / period_s).round() as usize >= RULES.slow_window
             }
             Self::SinceRisingEdge
             | Self::SinceFallingEdge
@@ -180,7 +180,7 @@ mod tests {
     fn names_and_stretches_read_well() {
         let long = C::Blowing { window_s: 4.0 };
         assert_eq!(long.to_string(), "blowing in the last 4 s");
-        assert!(long.is_slow() && !C::Blowing { window_s: 0.25 }.is_slow());
+        assert!(long.is_slow(0.001) && !C::Blowing { window_s: 0.25 }.is_slow(0.001));
         assert_eq!(
             long.stretch(0.25, 1.0),
             "at blowing in the last 4 s between 0.25 and 1"

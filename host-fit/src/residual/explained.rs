@@ -17,6 +17,8 @@ pub(super) struct Errors {
     /// Number of unscored samples at the start of each record.
     pub(super) lead: Vec<usize>,
     pub(super) period_s: f64,
+    /// Length of blocks whose errors count as independent, samples.
+    pub(super) block: usize,
 }
 
 /// How the error depends on a coordinate.
@@ -51,11 +53,6 @@ struct JudgedSample {
 }
 
 impl Errors {
-    pub(super) fn block(&self, record: usize) -> usize {
-        let length = self.residual.get(record).map_or(0, Vec::len);
-        let block = (RULES.block_s / self.period_s).round() as usize;
-        block.clamp(1, (length / RULES.fewest_blocks).max(1))
-    }
 
     /// Σ (e² − σ²).
     pub(super) fn excess(&self) -> f64 {
@@ -71,10 +68,10 @@ impl Errors {
     }
 
     fn samples(&self, binned: &Binned) -> Vec<JudgedSample> {
+        let block = self.block;
         let mut samples = Vec::new();
         let mut blocks = 0;
         for record in 0..self.residual.len() {
-            let block = self.block(record);
             let length = self.residual[record].len();
             for k in self.lead[record]..length {
                 let of_record = k / block;
@@ -159,7 +156,7 @@ pub(super) fn explained(errors: &Errors, binned: &Binned, excess: f64) -> Option
     let samples = errors.samples(binned);
     let by_y = gains(&samples, binned, excess, 0)?;
     let mut ways = vec![(Dependence::Mean, by_y[0]), (Dependence::Size, by_y[2])];
-    if binned.coordinate.is_slow() {
+    if binned.coordinate.is_slow(errors.period_s) {
         ways.push((Dependence::Proportion, by_y[1]));
     }
     if binned.dwell.is_some() {

@@ -3,6 +3,7 @@
 
 mod binned;
 mod coordinate;
+mod correlation;
 mod explained;
 mod noise;
 #[cfg(test)]
@@ -14,6 +15,7 @@ mod trend;
 mod words;
 
 pub use coordinate::FailureCoordinate;
+pub(crate) use correlation::{correlation_times, independent_block};
 pub use explained::Dependence;
 pub use noise::NoiseSource;
 pub use rules::{RULES, Rules};
@@ -144,11 +146,18 @@ pub fn examine(records: &[&Record], simulated: Vec<Vec<f64>>, delay: usize) -> F
         .map(|(record, run)| record.y.iter().zip(run).map(|(y, sim)| y - sim).collect())
         .collect();
     let (noise, noise_source) = noise::floor(records, &residual);
+    let lead: Vec<usize> = records.iter().map(|record| record.lead).collect();
+    let scored: Vec<&[f64]> = residual
+        .iter()
+        .zip(&lead)
+        .map(|(e, lead)| e.get(*lead..).unwrap_or_default())
+        .collect();
     let errors = Errors {
+        block: independent_block(&scored),
         residual,
         simulated,
         noise,
-        lead: records.iter().map(|record| record.lead).collect(),
+        lead,
         period_s: records.first().map_or(1.0, |r| r.sample_period_s),
     };
     let source = Source {
@@ -205,13 +214,12 @@ fn is_above(errors: &Errors) -> bool {
     let mut blocks = Vec::new();
     let mut noise = 0.0;
     for record in 0..errors.residual.len() {
-        let block = errors.block(record);
         let judged = errors.residual[record]
             .iter()
             .zip(&errors.noise[record])
             .skip(errors.lead[record]);
         let excess: Vec<f64> = judged.map(|(e, v)| e * e - v).collect();
-        blocks.extend(excess.chunks(block).map(|c| c.iter().sum::<f64>()));
+        blocks.extend(excess.chunks(errors.block).map(|c| c.iter().sum::<f64>()));
         noise += errors.noise[record]
             .iter()
             .skip(errors.lead[record])

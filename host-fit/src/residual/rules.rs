@@ -16,10 +16,14 @@ rules! {
     /// variance exceeds this many standard deviations of the energy of as many independent samples as blocks.
     event_deviations: f64 = 4.0, "standard deviations", "convention; tested by the same tests";
 
-    /// Block length of folds and standard errors, longer than the memory of the flow.
-    block_s: f64 = 0.25, "s", "judgement: the window of ỹ in eq. (1) of the paper";
-    /// Fewest blocks of a record.
-    fewest_blocks: usize = 10, "", "convention";
+    /// Block length in correlation times; blocks count as independent.
+    correlation_times: f64 = 8.0, "correlation times", "tested in `the_p_value_is_calibrated_for_coloured_errors`";
+    /// Shortest block.
+    shortest_block: usize = 20, "samples", "judgement";
+    /// Fewest blocks; limits the block length.
+    fewest_blocks: usize = 24, "blocks", "judgement: a test with fewer blocks has no power";
+    /// Values used to estimate a correlation time.
+    plenty: usize = 4000, "values", "judgement: limits the time";
     /// Number of cross-validation folds over blocks.
     turns: usize = 5, "", "convention of cross-validation";
     /// A coordinate's share must be this many standard errors above 0: about ten coordinates are tested in
@@ -37,9 +41,9 @@ rules! {
     /// Bins of a coordinate with many values.
     bins: usize = 30, "", "judgement: 300 samples a bin in a record of 10 s";
     /// Windows of past blowing: time scales of the flow, of a plenum, of a wall.
-    windows_s: [f64; 3] = [0.25, 1.0, 4.0], "s", "judgement: the order of the time constants of a flow, a plenum and a wall";
+    windows: [usize; 3] = [250, 1000, 4000], "samples", "judgement: at 1 kHz the order of the time constants of a flow, a plenum and a wall";
     /// A window at least this long changes more slowly than y, so the gain may depend on it.
-    slow_window_s: f64 = 1.0, "s", "judgement: four windows of ỹ";
+    slow_window: usize = 1000, "samples", "judgement: four windows of ỹ";
     /// Longest cycle of pulses that is tried.
     longest_cycle: usize = 8, "pulses", "judgement; the missing-pulse plants drop one in 3 to 5";
     /// An input that changes at more samples than this share is not piecewise constant.
@@ -59,7 +63,7 @@ rules! {
     pulses_are_a_clock: f64 = 1.3, "times", "the plants of `table_of_plants`";
 
     /// Segment length of spectra.
-    piece_s: f64 = 1.024, "s", "a power of two at 1 kHz";
+    piece: usize = 1024, "samples", "judgement: the longest lags are half as long";
     /// Fewest segments of a spectrum.
     fewest_pieces: usize = 6, "", "three for training and three for testing";
     /// A band's spectrum must exceed that of the noise by this many standard errors.

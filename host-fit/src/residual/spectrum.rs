@@ -18,8 +18,7 @@ struct Piece {
 /// How the error above the noise differs in its spectrum from y. An error with the spectrum of y is at no particular
 /// frequency.
 pub(super) fn by_frequency(errors: &Errors, excess: f64) -> Option<Where> {
-    let length = ((RULES.piece_s / errors.period_s) as usize).clamp(64, 4096);
-    let length = 1 << length.ilog2();
+    let length = 1 << RULES.piece.clamp(64, 4096).ilog2();
     let mut limits = vec![0.5];
     while *limits.last()? < length as f64 / 2.0 {
         limits.push((limits.last()? * 2.0).min(length as f64 / 2.0));

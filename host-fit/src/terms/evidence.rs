@@ -1,8 +1,8 @@
 //! Comparison of two models on validation records: effect size, significance under correlated errors, and the
 //! gain expected under noise alone.
 
-use super::RULES;
 use crate::linalg::dot;
+use crate::residual::{correlation_times, independent_block};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 /// Standard deviation of a normal distribution over its median absolute deviation.
@@ -26,7 +26,7 @@ impl HeldOut {
         let sum_of_squares = errors.iter().map(|e| dot(e, e)).sum();
         let samples = errors.iter().map(Vec::len).sum();
         Self {
-            block: block(&errors),
+            block: independent_block(&errors),
             errors,
             sum_of_squares,
             samples,
@@ -46,7 +46,7 @@ impl HeldOut {
 
     /// Correlation length: number of samples per independent sample.
     pub(crate) fn correlated(&self) -> f64 {
-        (self.block as f64 / RULES.correlation_times).max(1.0)
+        correlation_times(self.block)
     }
 
     /// Block length in samples; blocks count as independent.
@@ -61,29 +61,6 @@ impl HeldOut {
         }
         (self.sum_of_squares / self.samples as f64).sqrt()
     }
-}
-
-/// Block length in samples such that the errors of neighbouring blocks count as independent.
-fn block(errors: &[Vec<f64>]) -> usize {
-    let samples: usize = errors.iter().map(Vec::len).sum();
-    let thinned = (samples / RULES.plenty).max(1);
-    let means = |errors: &Vec<f64>| -> Vec<f64> {
-        let each = errors.chunks_exact(thinned);
-        each.map(|chunk| chunk.iter().sum::<f64>() / thinned as f64)
-            .collect()
-    };
-    let series: Vec<Vec<f64>> = errors.iter().map(means).collect();
-    let covariance = |lag: usize| -> f64 {
-        let pairs = series.iter().filter(|s| s.len() > lag);
-        pairs.map(|s| dot(&s[lag..], &s[..s.len() - lag])).sum()
-    };
-    let longest = samples / RULES.fewest_blocks;
-    let variance = covariance(0).max(f64::MIN_POSITIVE);
-    // The autocorrelation is summed up to its first zero crossing.
-    let correlations = (1..=longest / thinned).map(|lag| covariance(lag) / variance);
-    let time = 1.0 + 2.0 * correlations.take_while(|rho| *rho > 0.0).sum::<f64>();
-    let samples = (RULES.correlation_times * time * thinned as f64) as usize;
-    samples.clamp(RULES.shortest_block, longest.max(RULES.shortest_block))
 }
 
 /// One-sided p-value of "`better` has the smaller validation error than `worse`".

@@ -157,14 +157,6 @@ rules! {
     /// The scatter of an effect's gain is estimated from at least this many records; if there are fewer, from
     /// pieces of them.
     fewest_pieces: usize = 8, "", "judgement: the scatter of fewer pieces is uncertain by more than a third";
-    /// Block length in correlation times; blocks count as independent.
-    correlation_times: f64 = 8.0, "correlation times", "tested in `the_p_value_is_calibrated_for_coloured_errors`";
-    /// Shortest block.
-    shortest_block: usize = 20, "samples", "judgement";
-    /// Fewest blocks; limits the block length.
-    fewest_blocks: usize = 24, "blocks", "judgement: a test with fewer blocks has no power";
-    /// Values used to estimate a correlation time.
-    plenty: usize = 4000, "values", "judgement: limits the time";
     /// Bootstrap resamples of the validation samples: records first, then blocks.
     resamples: usize = 400, "", "the shares are then accurate to 0.025";
     /// A model is excluded if it wins less often than the best by more than this over √2.

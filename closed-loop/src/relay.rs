@@ -9,6 +9,8 @@ pub struct Relay {
     times: HoldTimes,
     /// Half of the dead band, y.
     half_band: f64,
+    /// The reading without friction, y.
+    zero: f64,
     reference: f64,
     hold: Hold,
     wanted: bool,
@@ -21,10 +23,17 @@ impl Relay {
         Self {
             times,
             half_band,
+            zero: 0.0,
             reference: 0.0,
             hold: Hold::closed(),
             wanted: false,
         }
+    }
+
+    /// The relay with a sensor that reads `zero` (y) without friction.
+    #[must_use]
+    pub fn with_zero(self, zero: f64) -> Self {
+        Self { zero, ..self }
     }
 }
 
@@ -33,7 +42,7 @@ impl Controller for Relay {
         self.reference = reference;
     }
     fn command(&mut self, reading: Option<f64>) -> bool {
-        if let Some(y) = reading {
+        if let Some(y) = reading.map(|y| y - self.zero) {
             if y < self.reference - self.half_band {
                 self.wanted = true;
             } else if y > self.reference + self.half_band {

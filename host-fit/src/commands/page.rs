@@ -16,9 +16,9 @@ use super::drawings::{experiment_picture, ladder_picture, margin_picture, proof_
 use super::page_parts::{Run, Stretch, card, checks, stretch_picture, worst_stretch};
 use super::tried::Tried;
 use super::words::{
-    PARAMETERS, SIDE_BY_SIDE, TRIALS, Words, describe, dropped_terms, ladder_caption, ladder_rows, named_first,
-    parameter_rows, ranking_rows, role_name, score_rows, side_by_side_rows, trial_caption,
-    trial_rows,
+    PARAMETERS, SIDE_BY_SIDE, TRIALS, Words, describe, dropped_terms, ladder_caption, ladder_rows,
+    named_first, parameter_rows, ranking_rows, role_name, score_rows, side_by_side_rows,
+    trial_caption, trial_rows,
 };
 
 /// The page of a comparison, made by `command`.

@@ -321,10 +321,11 @@ where
     let (others, trace) = cases(&ready, model, trials);
     let mut cases = vec![on_model(law, &bench)];
     cases.extend(others);
+    let mut relay = Relay::new(law.hold, 0.0).with_zero(model.zero_among(&model.values()));
     Proof {
         cases,
         trace,
-        compared: compared(&mut Relay::new(law.hold, 0.0), law.reference, model, trials),
+        compared: compared(&mut relay, law.reference, model, trials),
         compared_name: "plain relay, same hold times",
     }
 }

@@ -75,32 +75,20 @@ pub(crate) fn estimates_among(
     .collect()
 }
 
-/// Whether the records identify an effect: the interval of its amplitude excludes 0, and the interval of at least
-/// one positive parameter is narrower than a factor. Two parameters may be correlated, for example those of King's
-/// law; then only a combination of them is identifiable.
-pub(super) fn is_identified(fit: &Fit, spec: &Spec) -> bool {
-    let values = fit.model.values();
-    let mut spans = own(&fit.model, spec)
-        .into_iter()
-        .filter_map(|(index, card)| {
-            let half = DEVIATES * fit.standard_error(index).unwrap_or(f64::INFINITY);
-            (card.is_logarithmic() && card.low < card.high).then(|| 2.0 * half / values[index])
-        });
+/// Whether these intervals identify an effect: that of its amplitude excludes 0, and that of at least one positive
+/// parameter is narrower than a factor. Two parameters may be correlated, for example those of King's law; then only a
+/// combination of them is identifiable.
+pub(super) fn is_identified(estimates: &BTreeMap<String, ParameterEstimate>, spec: &Spec) -> bool {
+    let amplitude = spec.amplitude.filter(|amplitude| amplitude.linear);
+    let amplitude = amplitude.and_then(|amplitude| estimates.get(amplitude.parameter));
+    let cards = spec.parameters.iter().filter(|card| card.is_logarithmic());
+    let mut spans = cards
+        .filter_map(|card| estimates.get(card.name))
+        .filter(|one| one.low < one.high)
+        .map(|one| one.high / one.low);
     let least = spans.next().map(|first| spans.fold(first, f64::min));
-    excludes_zero(fit, spec) && least.is_none_or(|least| least <= RULES.identified.ln())
-}
-
-/// Whether the interval of an effect's linear amplitude, if it has one, excludes 0.
-fn excludes_zero(fit: &Fit, spec: &Spec) -> bool {
-    let Some(amplitude) = spec.amplitude.filter(|amplitude| amplitude.linear) else {
-        return true;
-    };
-    let mut own = own(&fit.model, spec).into_iter();
-    let place = own.find(|(_, card)| amplitude.parameter == card.name);
-    place.is_none_or(|(index, _)| {
-        let half = DEVIATES * fit.standard_error(index).unwrap_or(f64::INFINITY);
-        fit.model.values()[index].abs() > half
-    })
+    amplitude.is_none_or(|one| one.low > 0.0 || one.high < 0.0)
+        && least.is_none_or(|least| least < RULES.identified)
 }
 
 /// An effect's parameters with their indices among the coordinates of a model.
@@ -117,47 +105,52 @@ fn own(model: &Model, spec: &Spec) -> Vec<(usize, &'static Parameter)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fit::FitStop;
     use model_core::effects::spec;
 
-    /// Whether an effect with these values counts as identified with these standard errors.
-    fn known_to(name: &str, values: &[f64], errors: &[f64]) -> bool {
-        let effect = spec(name).expect("in the catalogue");
-        let mut model = Model::default();
-        model.add(effect, values, Some(1.0));
-        let places: Vec<(usize, &Parameter)> = own(&model, effect);
-        let count = errors.len();
-        let mut covariance = vec![0.0; count * count];
-        for (at, error) in errors.iter().enumerate() {
-            covariance[at * count + at] = error * error;
-        }
-        let fit = Fit {
-            free: places.iter().map(|(index, _)| *index).collect(),
-            model,
-            sum_of_squares: 1.0,
-            samples: 100,
-            covariance,
-            iterations: 1,
-            stop: FitStop::Converged,
+    /// Whether an effect with these parameters and intervals counts as identified.
+    fn known_to(name: &str, intervals: &[(&str, f64, f64, f64)]) -> bool {
+        let estimate = |&(name, low, value, high): &(&str, f64, f64, f64)| {
+            let unit = String::new();
+            let estimate = ParameterEstimate {
+                value,
+                unit,
+                low,
+                high,
+            };
+            (name.to_owned(), estimate)
         };
-        is_identified(&fit, effect)
+        let effect = spec(name).expect("in the catalogue");
+        is_identified(&intervals.iter().map(estimate).collect(), effect)
     }
 
     #[test]
     fn an_amplitude_that_may_be_none_and_a_time_that_may_be_any_are_not_known() {
-        let known = |gain, decay| known_to("starting-vortex", &[0.3, 0.03], &[gain, decay]);
-        assert!(known(0.1, 0.01));
-        assert!(!known(0.2, 0.01));
-        assert!(!known(0.1, 0.05));
+        let known = |low, high, longest| {
+            let gain = ("gain", low, 0.3, high);
+            known_to(
+                "starting-vortex",
+                &[gain, ("decay_time", 0.02, 0.03, longest)],
+            )
+        };
+        assert!(known(0.1, 0.5, 0.05));
+        assert!(!known(-0.1, 0.7, 0.05));
+        assert!(!known(0.1, 0.5, 3.0));
     }
 
     /// Ratio and offset of King's law are correlated: one of them is enough.
     #[test]
     fn one_known_parameter_of_two_identifies_an_effect() {
-        let known =
-            |ratio, offset| known_to("hot-film-nonlinearity", &[1.5, 0.2], &[ratio, offset]);
-        assert!(known(2.4, 0.04));
-        assert!(known(0.3, 0.4));
-        assert!(!known(2.4, 0.4));
+        let known = |ratio: f64, offset: f64| {
+            let interval =
+                |name, value: f64, factor: f64| (name, value / factor, value, value * factor);
+            let both = [
+                interval("king_ratio", 1.5, ratio),
+                interval("king_offset", 0.2, offset),
+            ];
+            known_to("hot-film-nonlinearity", &both)
+        };
+        assert!(known(20.0, 1.2));
+        assert!(known(1.5, 20.0));
+        assert!(!known(20.0, 20.0));
     }
 }

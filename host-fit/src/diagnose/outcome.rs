@@ -1,5 +1,6 @@
 //! The result of a diagnosis.
 
+use super::estimate::is_identified;
 use super::memory::memory;
 use super::{Certificate, Memory, ParameterEstimate, Parsimony, Quoted};
 use crate::data::Record;
@@ -9,6 +10,7 @@ use crate::model::Model;
 use crate::residual::NoiseSource;
 use crate::terms::{HeldOut, HeldOutBy, Hypothesis, Judge, Units};
 use model_core::effect::Spec;
+use model_core::effects::spec;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -55,6 +57,16 @@ pub struct Rung {
 }
 
 impl Diagnosis {
+    /// Whether the records determine the parameters of this effect of the final model.
+    #[must_use]
+    pub fn is_identified(&self, effect: &str) -> bool {
+        let estimates = self.parameters.get(effect);
+        let spec = spec(effect);
+        estimates
+            .zip(spec)
+            .is_none_or(|(estimates, spec)| is_identified(estimates, spec))
+    }
+
     /// Returns to the given model if no effect is named and the search did not lower its error.
     pub(super) fn no_worse_than(mut self, given: &Model, as_given: Rung) -> Self {
         let named = !self.missing.is_empty() || !self.stand_ins.is_empty();

@@ -171,7 +171,13 @@ impl Session<'_> {
         let certificates = self.certificates(subject, &sets, &others, &found);
         let nats = |spec: &&'static Spec| Some(certificates.get(spec.name)?.evidence_nats);
         let evidence: Vec<Option<f64>> = order.iter().take(way.proven).map(nats).collect();
-        let proven = if claims { evident(&evidence) } else { 0 };
+        let is_known = |spec: &&&'static Spec| is_identified(&parameters[spec.name], spec);
+        let known = order.iter().take_while(is_known).count();
+        let proven = if claims {
+            evident(&evidence).min(known)
+        } else {
+            0
+        };
         let (verdict, claims) = match claims && proven == 0 {
             true => (Verdict::PartlyExplained, false),
             false => (verdict, claims),
@@ -214,7 +220,7 @@ impl Session<'_> {
         let is_certified = |name: &String| {
             let spec = order.iter().find(|spec| spec.name == name.as_str());
             let certificate = certificates.get(name);
-            spec.is_some_and(|spec| is_identified(&end, spec))
+            spec.is_some_and(|spec| is_identified(&parameters[spec.name], spec))
                 && certificate.is_some_and(Certificate::holds_beside_others)
         };
         let certified = stand_ins
@@ -302,10 +308,7 @@ impl Session<'_> {
                 break;
             };
             left.retain(|other| other.name != spec.name);
-            let stands_in = || {
-                !is_identified(&current.judged.fits[0], spec)
-                    || self.does_as_well_twice(&left, &lesser, &current)
-            };
+            let stands_in = || self.does_as_well_twice(&left, &lesser, &current);
             if claims && unproven == later.len() && stands_in() {
                 unproven += 1;
             }

@@ -201,14 +201,13 @@ impl Session<'_> {
             }
         };
         let leaner = is_leaner(best, bare);
-        let known = judge.noise_source != NoiseSource::Scatter;
-        // Near a known noise level, even an effect with a small gain reaches that level.
+        // Near the noise level, even an effect with a small gain reaches that level.
         let least = if fits || explained {
             RULES.most
         } else {
             RULES.stands_in
         };
-        if taken < least && !(fits && (leaner || !known)) {
+        if taken < least && !(fits && leaner) {
             return of_bare();
         }
         Conclusion {

@@ -1,8 +1,8 @@
 //! Whether y responds to the command of its own row.
 //!
 //! In a model, and on a board, y_k is read before u_k is set, so u_k acts on y_{k+1} first. A logger that sets the
-//! command, waits and then reads writes rows in which y_k responds to u_k. For a plant as fast as the sampling no dead
-//! time describes that; u is then moved up by one row.
+//! command, waits and then reads, or a program that steps a plant and then prints it, writes rows in which y_k responds
+//! to u_k. No dead time describes that: y moves one sample before the model does. u is then moved up by one row.
 
 use super::RULES;
 use crate::data::{Record, Use};
@@ -14,7 +14,8 @@ pub(super) fn in_own_row(records: &[Record]) -> Option<Vec<Record>> {
 }
 
 /// Whether u_k has a significant coefficient in y_k = c + Σ aᵢ·y_{k−i} + Σ bᵢ·u_{k−i} (i = 1, 2) + f·u_k, of the sign
-/// of the gain and of a large share of it. Feedback of y to u, as of a thermostat, has the opposite sign. `None` if the
+/// of f + Σ bᵢ and of a large share of it. Feedback of y to u, as of a thermostat, has the opposite sign. A reading that
+/// contains the command itself has a far larger share: there Σ bᵢ takes back most of f in the next row. `None` if the
 /// coefficients are not identifiable.
 fn responds(records: &[Record]) -> Option<bool> {
     let learning = || records.iter().filter(|r| r.role == Use::Identify);
@@ -41,12 +42,14 @@ fn responds(records: &[Record]) -> Option<bool> {
     let right = dots(&y, columns);
     let solution: Vec<f64> = inverse.chunks(size).map(|row| dot(row, &right)).collect();
     let (own, decay) = (solution[0], 1.0 - solution[3] - solution[4]);
-    let gain = solution[..3].iter().sum::<f64>() / decay;
+    let response = solution[..3].iter().sum::<f64>();
     let left = (dot(&y, &y) - dot(&solution, &right)).max(0.0);
     let freedom = y.len().checked_sub(size + 1).filter(|free| *free > 0)?;
     let error = (inverse[0] * left / freedom as f64).sqrt();
-    let share = own / gain;
-    Some(decay > 0.0 && share >= RULES.own_row && own.abs() > RULES.off_zero * error)
+    let [least, most] = RULES.own_row;
+    let share = own / response;
+    let is_share = share >= least && share <= most;
+    Some(decay > 0.0 && is_share && own.abs() > RULES.off_zero * error)
 }
 
 /// A record whose row k has the command of row k + 1.
@@ -85,7 +88,7 @@ mod tests {
 
     #[test]
     fn a_command_that_acts_in_its_own_row_is_moved() {
-        for time in [0.1, 2.0] {
+        for time in [0.1, 2.0, 30.0] {
             let from_next = record(time, 0, false);
             assert_eq!(in_own_row(std::slice::from_ref(&from_next)), None);
             assert_eq!(in_own_row(&[record(time, 2, false)]), None);
@@ -116,11 +119,20 @@ mod tests {
     }
 
     #[test]
-    fn a_slow_response_or_none_is_left_alone() {
-        let mut slow = record(30.0, 0, false);
-        slow.u.rotate_right(1);
-        assert_eq!(in_own_row(std::slice::from_ref(&slow)), None);
-        slow.u.fill(1.0);
-        assert_eq!(in_own_row(&[slow]), None);
+    fn a_reading_that_contains_the_command_is_left_alone() {
+        for (time, dead_time) in [(30.0, 0), (30.0, 9), (2.0, 9)] {
+            let mut coupled = record(time, dead_time, false);
+            for (y, u) in coupled.y.iter_mut().zip(&coupled.u) {
+                *y += 0.4 * u;
+            }
+            assert_eq!(in_own_row(&[coupled]), None);
+        }
+    }
+
+    #[test]
+    fn without_a_response_nothing_is_moved() {
+        let mut still = record(30.0, 0, false);
+        still.u.fill(1.0);
+        assert_eq!(in_own_row(&[still]), None);
     }
 }

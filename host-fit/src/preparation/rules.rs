@@ -16,8 +16,9 @@ rules! {
     /// If the reference explains less than this share, y counts as independent of u.
     related: f64 = 0.2, "share of the variance", "judgement";
 
-    /// y responds to the command of its own row if that response is at least this share of the gain.
-    own_row: f64 = 0.25, "share of the gain", "judgement: reached with time constants up to 3.5 samples, for which a shift of one row matters";
+    /// y responds to the command of its own row if that response is this share, from … to, of the response in the first
+    /// three rows.
+    own_row: [f64; 2] = [0.25, 2.0], "share of the response", "a shift by one row has a share of 1, the mean over a row 0.5, a direct part in y above 5";
 
     /// A record rests until its first edge plus this share of the dead time. An earlier response belongs to an edge
     /// before the record.

@@ -53,7 +53,6 @@ struct JudgedSample {
 }
 
 impl Errors {
-
     /// Σ (e² − σ²).
     pub(super) fn excess(&self) -> f64 {
         let each = self.residual.iter().zip(&self.noise).zip(&self.lead);

@@ -7,6 +7,25 @@ pub const MODEL: &str = "model.toml";
 /// Placeholder of the data set in [`Answer::next`], replaced by [`Answer::with_files`].
 pub const DATASET: &str = "DATASET";
 
+/// The usual name of an extended model in [`Answer::next`].
+const BETTER: &str = "better.toml";
+
+/// A name for the extension of `model` that does not overwrite it: `better.toml`, then `better-2.toml` …
+fn better_than(model: &str) -> String {
+    let file = model.rsplit('/').next().unwrap_or(model);
+    let number = file.strip_prefix("better").and_then(|rest| {
+        let number = rest.trim_matches('\'').strip_suffix(".toml")?;
+        match number.strip_prefix('-') {
+            Some(digits) => digits.parse::<u32>().ok(),
+            None => number.is_empty().then_some(1),
+        }
+    });
+    match number {
+        Some(number) => format!("better-{}.toml", number.saturating_add(1)),
+        None => BETTER.to_owned(),
+    }
+}
+
 /// Tone of a verdict.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
@@ -93,9 +112,10 @@ impl Answer {
     #[must_use]
     pub fn with_files(mut self, model: &str, dataset: &str) -> Self {
         let words = self.next.split(' ').map(|word| match word {
-            MODEL => model,
-            DATASET => dataset,
-            other => other,
+            MODEL => model.to_owned(),
+            DATASET => dataset.to_owned(),
+            BETTER => better_than(model),
+            other => other.to_owned(),
         });
         self.next = words.collect::<Vec<_>>().join(" ");
         self
@@ -186,6 +206,13 @@ mod tests {
 
     #[test]
     fn only_whole_words_are_replaced_by_files() {
+        let extend = |model| {
+            let next = Answer::default().next("host-fit extend model.toml DATASET -o better.toml");
+            next.with_files(model, "ramp").next
+        };
+        assert!(extend("fit.toml").ends_with("-o better.toml"));
+        assert!(extend("out/better.toml").ends_with("-o better-2.toml"));
+        assert!(extend("better-2.toml").ends_with("-o better-3.toml"));
         let next = Answer::default().next("host-fit extend model.toml DATASET -o my-model.toml");
         let next = next.with_files("a.toml", "'my data'").next;
         assert_eq!(next, "host-fit extend a.toml 'my data' -o my-model.toml");

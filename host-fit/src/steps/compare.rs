@@ -2,8 +2,8 @@
 
 use serde::{Serialize, Serializer};
 
-use super::prepared::prepared;
 use super::design::command_after;
+use super::prepared::prepared;
 use super::{Answer, Beside, StepError, check_period, level};
 use crate::data::DataSet;
 use crate::indicators::{Scores, score};

@@ -7,7 +7,8 @@ use super::{StepError, check_period};
 use crate::data::DataSet;
 use crate::design::{
     DesignError, Margin, MaximiseRequest, Optimum, PossibleFlow, Proof, RULES, TrackDesign,
-    TrackRequest, Trial, Trials, held, margin, maximise, possible_flows, prove, prove_pulses, track,
+    TrackRequest, Trial, Trials, held, margin, maximise, possible_flows, prove, prove_pulses,
+    track,
 };
 use crate::fit::RULES as FIT;
 use crate::model::{Law, Model};

@@ -33,9 +33,14 @@ pub(super) fn error_name(role: Use) -> &'static str {
 
 /// The residual test of an output-error model: the share of lags at which the cross-correlation of u and the residual
 /// lies outside its 95 % band. The autocorrelation is no test here, because measurement noise may be coloured.
-fn residual_test((_, cross): &(Correlation, Correlation)) -> String {
+fn residual_test((_, cross): &(Correlation, Correlation), above_noise: bool) -> String {
+    let small = match cross.outside > 0.1 && !above_noise {
+        true => " A response to u is missing that is smaller than the noise.",
+        false => "",
+    };
     format!(
-        "Residual test: {:.0} % of the cross-correlation with u lies outside its 95 % band (5 % expected of a complete model).",
+        "Residual test: {:.0} % of the cross-correlation with u lies outside its 95 % band (5 % expected of a complete \
+         model).{small}",
         100.0 * cross.outside
     )
 }
@@ -59,15 +64,17 @@ pub(super) fn compared(
         )
         .next("host-fit diagnose model.toml DATASET --report diagnosis.html")
     } else {
-        Answer::new(Tone::Good, format!("the {error} is at the noise level"))
-            .next(finished())
+        Answer::new(Tone::Good, format!("the {error} is at the noise level")).next(finished())
     };
     answer
         .evidence(format!(
             "The {error} of the free run is {}.",
             beside_noise(all)
         ))
-        .confidence(residual_test(&correlations(&Residuals::of(records, runs))))
+        .confidence(residual_test(
+            &correlations(&Residuals::of(records, runs)),
+            failures.above_noise,
+        ))
 }
 
 /// The answer of an identification; `parameters` are those of the model.
@@ -117,16 +124,19 @@ pub(super) fn extended(
         || "It diverged before".to_owned(),
         |before| format!("It was {} before", beside_noise(before)),
     );
-    Answer::new(
-        Tone::Finding,
-        format!("{effects} added, the {error} is lower"),
-    )
-    .evidence(format!(
-        "The {error} of the free run is {}. {was}.",
-        beside_noise(after)
-    ))
-    .confidence("A refit is not a significance test; `host-fit diagnose` gives the p-value.")
-    .next("host-fit compare model.toml DATASET --report report.html")
+    // Errors that agree in the printed digits.
+    let is_lower = before.is_none_or(|before| after.rmse < 0.995 * before.rmse);
+    let (tone, change) = match is_lower {
+        true => (Tone::Finding, "is lower"),
+        false => (Tone::Warning, "is not lower"),
+    };
+    Answer::new(tone, format!("{effects} added, the {error} {change}"))
+        .evidence(format!(
+            "The {error} of the free run is {}. {was}.",
+            beside_noise(after)
+        ))
+        .confidence("A refit is not a significance test; `host-fit diagnose` gives the p-value.")
+        .next("host-fit compare model.toml DATASET --report report.html")
 }
 
 /// The answer of several models side by side: the best one first.

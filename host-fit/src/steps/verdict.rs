@@ -193,9 +193,13 @@ fn finding(diagnosis: &Diagnosis, plant: Plant) -> Answer {
         Verdict::PartlyExplained => {
             let own = |name| diagnosis.certificates.get(name);
             let mut certificates = diagnosis.stand_ins.iter().filter_map(own);
-            let why = match certificates.any(|one| one.evidence_nats < 0.0) {
-                true => "there is more evidence for a model without them",
-                false => "too much variance stays unexplained",
+            let unknown = |name: &String| !diagnosis.is_identified(name);
+            let why = if certificates.any(|one| one.evidence_nats < 0.0) {
+                "there is more evidence for a model without them"
+            } else if diagnosis.stand_ins.iter().any(unknown) {
+                "the records do not determine their parameters"
+            } else {
+                "too much variance stays unexplained"
             };
             Answer::new(Tone::Warning, "something is missing; its cause is not identified")
                 .evidence(format!(
@@ -329,8 +333,8 @@ fn records(answer: &mut Answer, diagnosis: &Diagnosis, judged_rmse: Option<f64>)
             ))
         )),
         (HeldOutBy::Records, None) if diagnosis.tried > 0 => answer.note(
-            "The structure was chosen on these validation records, so the error is optimistic; add a fourth `validate` \
-             record for an independent estimate.",
+            "The structure was chosen on these validation records, so the error is optimistic. With four or more of \
+             them, every third is set aside for an independent estimate.",
         ),
         (HeldOutBy::Records, None) => {}
         (HeldOutBy::Turns, _) => answer.note(

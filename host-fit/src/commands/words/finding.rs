@@ -79,7 +79,7 @@ fn ladder_table(ladder: &[Rung]) -> String {
 /// Why the error of the second step is larger than that of the given model; empty if it is not.
 pub(crate) fn ladder_caption(ladder: &[Rung]) -> &'static str {
     match ladder {
-        [given, next, _, ..] if next.validate_rmse > given.validate_rmse => {
+        [given, next, _, ..] if next.validate_rmse > 1.005 * given.validate_rmse => {
             "The second step leaves out lags and terms of the given model that could hide an effect; the error is \
              therefore larger there."
         }
@@ -87,14 +87,13 @@ pub(crate) fn ladder_caption(ladder: &[Rung]) -> &'static str {
     }
 }
 
-/// `name value unit (low … high)`, or that it is not identifiable: its interval spans its whole range, or a factor
-/// of more than a hundred.
+/// `name value unit (low … high)`, or that it is not identifiable: its interval spans its whole range, or more than a
+/// factor.
 fn estimate_words(effect: &str, name: &str, p: &ParameterEstimate) -> String {
-    const FACTOR: f64 = 100.0;
     let unit = if p.unit == "-" { "" } else { p.unit.as_str() };
     let space = if unit.is_empty() { "" } else { " " };
     let card = spec(effect).and_then(|s| s.parameters.iter().find(|card| card.name == name));
-    let wide = p.low > 0.0 && p.high > FACTOR * p.low;
+    let wide = p.low > 0.0 && p.high >= RULES.identified * p.low;
     let whole = card.is_some_and(|card| {
         let dimensionless = p.unit == "-";
         dimensionless && p.low <= card.low && p.high >= card.high

@@ -10,7 +10,7 @@ use host_fit::steps;
 
 use super::effect_files::EffectFiles;
 use super::effect_names::EffectName;
-use super::load::ModelAndData;
+use super::load::{ModelAndData, shell_word};
 use super::{Console, check_outputs, page};
 
 /// Find a missing term outside the catalogue: where it acts, what it depends on, its curve and a formula.
@@ -80,7 +80,18 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
     let (mut model, set) = args.from.load()?;
     let options = args.prepare(&mut model)?;
     let mut found = steps::discover(&model, &set, &options, &console.watch())?;
-    found.answer = args.from.name_in(found.answer);
+    found.answer = match &args.output {
+        // The model is written: it can be compared.
+        Some(path) if !found.answer.next.is_empty() => {
+            let compare = "host-fit compare model.toml DATASET --report report.html";
+            let data = shell_word(args.from.dataset());
+            found
+                .answer
+                .next(compare)
+                .with_files(&shell_word(path), &data)
+        }
+        _ => args.from.name_in(found.answer),
+    };
     let mut written: Vec<&Path> = Vec::new();
     if let Some(path) = &args.report {
         let page = page::discovery(&model, &set, &found, &page::command_line());

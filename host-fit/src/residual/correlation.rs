@@ -1,7 +1,11 @@
-//! How far apart errors count as independent.
+//! Tests on correlated errors: blocks that count as independent, and whether their sum is above 0.
 
 use super::rules::RULES;
 use crate::linalg::dot;
+use statrs::distribution::{ContinuousCDF, StudentsT};
+
+/// Standard deviation of a normal distribution over its median absolute deviation.
+const NORMAL: f64 = 1.4826;
 
 /// Block length in samples such that the errors of neighbouring blocks count as independent.
 pub(crate) fn independent_block(errors: &[impl AsRef<[f64]>]) -> usize {
@@ -29,4 +33,31 @@ pub(crate) fn independent_block(errors: &[impl AsRef<[f64]>]) -> usize {
 /// The correlation time of a block of [`independent_block`], samples; at least 1.
 pub(crate) fn correlation_times(block: usize) -> f64 {
     (block as f64 / RULES.correlation_times).max(1.0)
+}
+
+/// p-value of "the sum of these independent blocks is above 0". Their scatter is estimated from the median absolute
+/// deviation, so that an error in few blocks does not inflate it. 1 for fewer than three blocks.
+pub(crate) fn p_above(blocks: Vec<f64>) -> f64 {
+    let n = blocks.len() as f64;
+    if n < 3.0 {
+        return 1.0;
+    }
+    let mean = blocks.iter().sum::<f64>() / n;
+    let middle = median(blocks.clone());
+    let deviation = median(blocks.iter().map(|x| (x - middle).abs()).collect());
+    student(mean, NORMAL * deviation / n.sqrt(), n - 1.0)
+}
+
+/// One-sided p-value of "this estimate with this standard error is above 0".
+pub(crate) fn student(estimate: f64, error: f64, degrees: f64) -> f64 {
+    if error <= 0.0 {
+        return if estimate > 0.0 { 0.0 } else { 1.0 };
+    }
+    StudentsT::new(0.0, 1.0, degrees).map_or(1.0, |t| t.sf(estimate / error))
+}
+
+/// The median; 0 of an empty list.
+fn median(mut numbers: Vec<f64>) -> f64 {
+    numbers.sort_by(f64::total_cmp);
+    numbers.get(numbers.len() / 2).copied().unwrap_or(0.0)
 }

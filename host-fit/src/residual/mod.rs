@@ -15,7 +15,7 @@ mod trend;
 mod words;
 
 pub use coordinate::FailureCoordinate;
-pub(crate) use correlation::{correlation_times, independent_block};
+pub(crate) use correlation::{correlation_times, independent_block, p_above, student};
 pub use explained::Dependence;
 pub use noise::NoiseSource;
 pub use rules::{RULES, Rules};
@@ -28,7 +28,7 @@ use crate::order;
 use crate::picture::{FailureBin, FailureView};
 use crate::simulate::SimulateError;
 use binned::{Binned, Source, coordinates};
-use explained::{Errors, beyond_chance, explained};
+use explained::{Errors, explained};
 use serde::Serialize;
 
 /// The error along one coordinate. Serialises to the keys of `compare --json`.
@@ -225,12 +225,7 @@ fn is_above(errors: &Errors) -> bool {
             .skip(errors.lead[record])
             .sum::<f64>();
     }
-    let excess: f64 = blocks.iter().sum();
-    // A single large event has no reproducible mean. It is still distinguished from noise: Σ e² of as many
-    // independent samples as blocks has the relative standard deviation √(2/n).
-    let varies = (2.0 / blocks.len().max(1) as f64).sqrt();
-    let steady = beyond_chance(&blocks, RULES.excess_standard_errors) > RULES.least_excess * noise;
-    steady || excess > (RULES.least_excess + RULES.event_deviations * varies) * noise
+    blocks.iter().sum::<f64>() > RULES.least_excess * noise && p_above(blocks) < RULES.above_level
 }
 
 /// The cycle that explains most; its multiples explain equally much and are not preferred.

@@ -7,15 +7,11 @@ rules! {
     /// are reported.
     pub struct Rules in "residual";
 
-    /// The error is above the noise if the unexplained variance is this many standard errors above 0.
-    excess_standard_errors: f64 = 3.0, "standard errors", "convention; tested by `a_perfect_model_has_nothing_to_explain` and `pure_noise_explains_nothing`";
+    /// The error is above the noise if the test of the unexplained variance over blocks gives this p-value.
+    above_level: f64 = 0.001, "p-value", "convention; tested by `a_perfect_model_has_nothing_to_explain` and `pure_noise_explains_nothing`";
     /// The error is above the noise only if the unexplained variance is at least this share of the noise
     /// variance, the uncertainty of `y_sd`.
     least_excess: f64 = 0.05, "share of the noise energy", "a standard deviation from 20 repeats has an error of 16 %, from 800 samples 2.5 %, i.e. 5 % of the variance";
-    /// A single large event has no reproducible mean: the error is also above the noise if the unexplained
-    /// variance exceeds this many standard deviations of the energy of as many independent samples as blocks.
-    event_deviations: f64 = 4.0, "standard deviations", "convention; tested by the same tests";
-
     /// Block length in correlation times; blocks count as independent.
     correlation_times: f64 = 8.0, "correlation times", "tested in `the_p_value_is_calibrated_for_coloured_errors`";
     /// Shortest block.

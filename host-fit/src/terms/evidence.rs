@@ -2,11 +2,7 @@
 //! gain expected under noise alone.
 
 use crate::linalg::dot;
-use crate::residual::{correlation_times, independent_block};
-use statrs::distribution::{ContinuousCDF, StudentsT};
-
-/// Standard deviation of a normal distribution over its median absolute deviation.
-const NORMAL: f64 = 1.4826;
+use crate::residual::{correlation_times, independent_block, p_above, student};
 
 /// Free-run error y − y_sim of a model on the validation records, without the warm-up.
 #[derive(Clone, Debug)]
@@ -100,23 +96,7 @@ fn last_of_both<'a>(a: &'a [f64], b: &'a [f64]) -> (&'a [f64], &'a [f64]) {
     (&a[a.len() - n..], &b[b.len() - n..])
 }
 
-/// One-sided p-value of "this estimate with this standard error is above 0".
-fn student(estimate: f64, error: f64, degrees: f64) -> f64 {
-    if error <= 0.0 {
-        return if estimate > 0.0 { 0.0 } else { 1.0 };
-    }
-    StudentsT::new(0.0, 1.0, degrees).map_or(1.0, |t| t.sf(estimate / error))
-}
-
-/// The median; 0 of an empty list.
-fn median(mut numbers: Vec<f64>) -> f64 {
-    numbers.sort_by(f64::total_cmp);
-    numbers.get(numbers.len() / 2).copied().unwrap_or(0.0)
-}
-
-/// p-value of "Σ e² exceeds `margin` times Σ σ²" over blocks; σ² per sample in the shape of the errors. The
-/// scatter of the blocks is estimated from their median absolute deviation, so that an error in few blocks
-/// does not inflate it.
+/// p-value of "Σ e² exceeds `margin` times Σ σ²" over blocks; σ² per sample in the shape of the errors.
 pub(crate) fn p_above_noise(held_out: &HeldOut, variance: &[Vec<f64>], margin: f64) -> f64 {
     let block = held_out.block;
     let mut excess = Vec::new();
@@ -126,14 +106,7 @@ pub(crate) fn p_above_noise(held_out: &HeldOut, variance: &[Vec<f64>], margin: f
             excess.push(dot(errors, errors) - margin * variance.iter().sum::<f64>());
         }
     }
-    let n = excess.len() as f64;
-    if n < 3.0 {
-        return 1.0;
-    }
-    let mean = excess.iter().sum::<f64>() / n;
-    let middle = median(excess.clone());
-    let deviation = median(excess.iter().map(|x| (x - middle).abs()).collect());
-    student(mean, NORMAL * deviation / n.sqrt(), n - 1.0)
+    p_above(excess)
 }
 
 #[cfg(test)]

@@ -299,26 +299,41 @@ fn extend_finds_the_hidden_plenum() {
 }
 
 /// `identify` imitates the droop by base terms. With the droop they are dropped, and the error is that of the diagnosis.
+/// Each command is the one that the command before it prints, up to the code of a law.
 #[test]
-fn extend_drops_the_terms_that_imitate_the_effect() {
+fn the_printed_commands_lead_from_a_diagnosis_to_code() {
     let folder = tempfile::tempdir().expect("a folder");
     let ramp = part_of_the_ramp(folder.path());
     let imitating = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/imitates-a-droop.toml");
-    let (out, diagnosed) = (
-        folder.path().join("new.toml"),
-        folder.path().join("diagnosed.toml"),
-    );
-    let found = json("diagnose {} {} -o {}", &[&imitating, &ramp, &diagnosed]);
+    let followed = |command: &str| -> (Value, String) {
+        let line = command.replacen("host-fit", "--json", 1);
+        let output = host_fit(&line, &[]).current_dir(folder.path()).output();
+        let output = output.expect("the program starts");
+        let error = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(0), "{command}: {error}");
+        let found: Value = serde_json::from_slice(&output.stdout).expect("one JSON document");
+        let next = found["answer"]["next"].as_str().unwrap_or_default();
+        (found.clone(), next.to_owned())
+    };
+    let (imitating, ramp) = (imitating.display(), ramp.display());
+    let (found, next) = followed(&format!("host-fit diagnose {imitating} {ramp} -o by.toml"));
     assert_eq!(found["missing"], serde_json::json!(["plenum-droop"]));
-    let line = "extend {} {} --effect plenum-droop -o {}";
-    let extended = json(line, &[&imitating, &ramp, &out]);
+    let (extended, next) = followed(&next);
     let dropped = serde_json::json!(["slow-wake", "level-rate", "reading-curve", "lags"]);
     assert_eq!(extended["dropped"], dropped);
     let error = |of: &Value| number(&of["rmse"]);
-    let compared = json("compare {} {}", &[&diagnosed, &ramp]);
-    let by_diagnosis = error(&compared["validate"]);
-    assert!(error(&extended["after"]) < 1.01 * by_diagnosis);
+    let (by_diagnosis, _) = followed(&format!("host-fit compare by.toml {ramp}"));
+    assert!(error(&extended["after"]) < 1.01 * error(&by_diagnosis["validate"]));
     assert!(error(&extended["after"]) < error(&extended["before"]));
+    let (compared, next) = followed(&next);
+    assert_eq!(compared["validate"]["rmse"], extended["after"]["rmse"]);
+    assert!(next.contains(" --target "), "{next}");
+    let (designed, next) = followed(&next);
+    let kept = |case: &Value| case["kept"] == true;
+    assert!(kept(&designed["cases"][0]) && kept(&designed["cases"][1]));
+    followed(&next);
+    let code = std::fs::read_to_string(folder.path().join("identified.rs"));
+    assert!(code.expect("written").contains("PlenumDroop"));
 }
 
 #[test]

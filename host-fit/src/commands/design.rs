@@ -7,7 +7,7 @@ use host_fit::data::DataSet;
 use host_fit::design::{MaximiseRequest, TrackRequest, check_period};
 use host_fit::model::Model;
 use host_fit::output::write_atomic;
-use host_fit::steps::{self, DesignOutcome, DesignRequest};
+use host_fit::steps::{self, Answer, DesignOutcome, DesignRequest};
 use rig_line::RigFile;
 
 use super::average::{not_negative, positive};
@@ -300,7 +300,9 @@ impl Args {
             targets,
             not_tried: notes,
             file: shell_word(&self.output),
-        })
+            answer: Answer::default(),
+        }
+        .answered())
     }
 
     /// The goal in a few words.

@@ -349,7 +349,7 @@ pub(crate) fn lead(
 pub(super) fn law(model: &Model, tried: &Tried, tracks: bool, command: &str) -> String {
     let mut report = Report::new("Control law", &describe(model));
     report.columns();
-    card(&mut report, &tried.answer());
+    card(&mut report, &tried.answer);
     report.figure(
         &proof_picture(&tried.proof, tracks),
         "In the loop with the model as the plant and a noisy sensor.",

@@ -24,6 +24,8 @@ pub(super) struct Tried {
     /// The file of the law, quoted for a shell.
     #[serde(skip)]
     pub(super) file: String,
+    /// The answer of these trials.
+    pub(super) answer: Answer,
 }
 
 impl Tried {
@@ -58,8 +60,13 @@ impl Tried {
         }
     }
 
-    /// The answer: whether the law keeps attachment, in which trials, with which margin.
-    pub(super) fn answer(&self) -> Answer {
+    /// With the answer: whether the law keeps attachment, in which trials, with which margin.
+    pub(super) fn answered(self) -> Self {
+        let answer = self.concluded();
+        Self { answer, ..self }
+    }
+
+    fn concluded(&self) -> Answer {
         let verdict = self.verdict();
         let mut lines = verdict.lines();
         let evidence = lines.next().unwrap_or_default();
@@ -142,7 +149,7 @@ fn few(names: &[String]) -> String {
 
 impl Words for Tried {
     fn words(&self) -> String {
-        let answer = format!("{}\n", self.answer().words());
+        let answer = format!("{}\n", self.answer.words());
         [answer, self.design.words(), self.proof.words()].join("\n")
     }
 }

@@ -1,9 +1,10 @@
 //! Share of the error that is a function of a coordinate, by cross-validation.
 
 use super::binned::{Binned, Folds};
+use super::correlation::p_above;
 use super::rules::RULES;
 use crate::linalg::dot;
-use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
+use statrs::distribution::{ContinuousCDF, Normal};
 use std::collections::BTreeMap;
 
 /// The error of a free run, record by record, with the variance of the noise.
@@ -234,23 +235,12 @@ fn gains(
     })
 }
 
-/// The sum over independent blocks; 0 if it is not significant. It must exceed a quantile of the normal
-/// distribution and the same quantile of Student's t, because few blocks give an inaccurate estimate of their own
-/// variance.
+/// The sum over independent blocks; 0 if it is not this many standard errors above 0, by [`p_above`].
 pub(super) fn beyond_chance(gains: &[f64], standard_errors: f64) -> f64 {
-    let n = gains.len() as f64;
-    let free = (n - 1.0).max(1.0);
-    let level = Normal::standard().cdf(standard_errors);
-    let standard_errors = StudentsT::new(0.0, 1.0, free)
-        .map_or(standard_errors, |student| student.inverse_cdf(level));
-    let sum: f64 = gains.iter().sum();
-    let mean = sum / n.max(1.0);
-    let variance: f64 = gains.iter().map(|g| (g - mean) * (g - mean)).sum();
-    let standard_error = (variance * n / free).sqrt();
-    if sum > standard_errors * standard_error {
-        sum
-    } else {
-        0.0
+    let level = Normal::standard().sf(standard_errors);
+    match p_above(gains.to_vec()) < level {
+        true => gains.iter().sum(),
+        false => 0.0,
     }
 }
 
@@ -315,14 +305,15 @@ mod tests {
     /// blocks, 3.1.
     #[test]
     fn few_blocks_have_to_say_more() {
+        // 2.7 standard errors above 0, whatever n.
         let gains = |n: usize| -> Vec<f64> {
-            let apart = (n as f64 - 1.0).sqrt() / 2.7;
+            let apart = (n as f64).sqrt() / (2.7 * 1.4826);
             (0..n)
-                .map(|k| if k % 2 == 0 { 1.0 + apart } else { 1.0 - apart })
+                .map(|k| 1.0 + apart * ((k % 3) as f64 - 1.0))
                 .collect()
         };
-        assert_eq!(beyond_chance(&gains(10), 2.5), 0.0);
-        assert!((beyond_chance(&gains(400), 2.5) - 400.0).abs() < 1e-9);
-        assert!(beyond_chance(&gains(10), 1.9) > 0.0);
+        assert_eq!(beyond_chance(&gains(9), 2.5), 0.0);
+        assert!((beyond_chance(&gains(399), 2.5) - 399.0).abs() < 1e-9);
+        assert!(beyond_chance(&gains(9), 1.9) > 0.0);
     }
 }

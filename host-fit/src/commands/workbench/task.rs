@@ -264,7 +264,7 @@ impl Task {
                     &tried.proof.trace.to_csv(),
                 )?;
                 let kept = json!({
-                    "answer": tried.answer(),
+                    "answer": tried.answer,
                     "words": tried.design.words(),
                     "picture": picture.html(),
                     "margin": tried.margin.as_ref().map(|margin| drawings::margin_picture(margin).html()),

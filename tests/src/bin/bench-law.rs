@@ -26,6 +26,8 @@ const PLANTS: u64 = 8;
 const FIRST_SEED: u64 = 900;
 const SAMPLES: usize = 12_000;
 const JUDGED: usize = 3000;
+/// Exponent of [`Unknown::Film`].
+const FILM_EXPONENT: f64 = 0.65;
 const TIMES: HoldTimes = HoldTimes { on: 10, off: 10 };
 
 /// A run of a controller for a target on a bench.
@@ -41,7 +43,7 @@ enum Unknown {
     Resonance,
     /// A bubble that fills and reduces the level, the more the fuller it is.
     Memory,
-    /// Reading = full·(friction/full)^0.65: King's law with another exponent than the catalogue's.
+    /// Reading = full·(friction/full)^[`FILM_EXPONENT`]: King's law with another exponent than the catalogue's.
     Film,
 }
 
@@ -67,7 +69,7 @@ impl Unknown {
             ),
             Self::Film => spec.beyond.push(
                 PowerLaw {
-                    exponent: 0.65,
+                    exponent: FILM_EXPONENT,
                     full: base.gain,
                 }
                 .into(),
@@ -200,10 +202,16 @@ impl Bench {
             &mut flow,
             std::iter::repeat_n(reference, SAMPLES),
         );
-        trace
-            .samples
-            .iter_mut()
-            .for_each(|sample| sample.reference = goal);
+        for sample in &mut trace.samples {
+            sample.reference = goal;
+            // No controller can correct the curve of its sensor: there the error is that of the reading.
+            if self.unknown == Unknown::Film {
+                sample.friction = self.base.gain
+                    * (sample.friction / self.base.gain)
+                        .max(0.0)
+                        .powf(FILM_EXPONENT);
+            }
+        }
         Figures::of(&trace, JUDGED)
     }
 
@@ -419,7 +427,7 @@ fn beyond_the_model(level: f64) {
         (Unknown::Reversal, "inverse response, 0.3 for 20 ms"),
         (Unknown::Resonance, "a resonance at 25 Hz, damping 0.05"),
         (Unknown::Memory, "a memory that saturates"),
-        (Unknown::Film, "a film with exponent 0.65"),
+        (Unknown::Film, "a film with exponent 0.65: its reading"),
     ];
     heading(&format!(
         "Physics that the model lacks: held at {level} of steady blowing"

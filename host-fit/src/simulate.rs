@@ -54,6 +54,21 @@ pub enum SimulateError {
     },
 }
 
+impl SimulateError {
+    /// The error with the time of its sample at this sample period (s).
+    pub(crate) fn at_period(self, period_s: f64) -> Self {
+        match self {
+            Self::Diverged { record, sample, .. } => Self::Diverged {
+                record,
+                sample,
+                // Without the digits of a binary period.
+                time: (1e9 * sample as f64 * period_s).round() / 1e9,
+            },
+            other => other,
+        }
+    }
+}
+
 /// The input signals of a model, from their first sample on.
 #[derive(Clone, Debug)]
 pub struct Signals<'a> {

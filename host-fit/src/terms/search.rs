@@ -134,12 +134,20 @@ impl Search<'_> {
         let mut kept = std::mem::take(&mut bare.effects);
         kept.retain(|added| NUISANCES.iter().all(|spec| spec.name != added.name));
         let mut model = lean_base(&bare, &learning)?.model;
-        model.delay_between_samples();
-        model.effects = kept;
-        if mid_run {
-            model.start = Start::Measured;
+        model.effects.clone_from(&kept);
+        let mut own = Model {
+            effects: kept,
+            ..given.clone()
+        };
+        for model in [&mut model, &mut own] {
+            model.delay_between_samples();
+            if mid_run {
+                model.start = Start::Measured;
+            }
         }
-        let mut judged = self.judge.refitted(&model)?;
+        // A base that was fitted without the kept effects may diverge with them; the given one was fitted with them.
+        let refitted = self.judge.refitted(&model);
+        let mut judged = refitted.or_else(|error| self.judge.refitted(&own).map_err(|_| error))?;
         if !self.judge.on_off {
             // Graded commands identify the response to jets of part strength.
             let others = self.judge.other_gradings(judged.model().grading);

@@ -52,3 +52,20 @@ impl Controller for Relay {
         self.hold.pass(&self.times, self.wanted)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sensor_that_is_off_is_read_from_its_zero() {
+        let times = HoldTimes { on: 1, off: 1 };
+        let opens = |zero: f64, reading: f64| {
+            let mut relay = Relay::new(times, 0.0).with_zero(zero);
+            relay.set_reference(0.4);
+            (0..4).any(|_| relay.command(Some(reading)))
+        };
+        assert!(opens(0.0, 0.3) && !opens(0.0, 0.5));
+        assert!(opens(1.8, 2.1) && !opens(1.8, 2.3));
+    }
+}

@@ -41,32 +41,15 @@ pub enum SimulateError {
     },
     /// The model is unstable on this input.
     #[error(
-        "the model's free run of record `{record}` diverges at sample {sample} (t = {time} s). \
+        "the model's free run of record `{record}` diverges at sample {sample}. \
          The model is unstable for this input; identify it again, with fewer lags or `--objective free-run`."
     )]
     Diverged {
         /// The record.
         record: String,
-        /// First sample beyond the divergence limit.
+        /// First sample beyond the divergence limit, from 0.
         sample: usize,
-        /// Time of the sample, s.
-        time: f64,
     },
-}
-
-impl SimulateError {
-    /// The error with the time of its sample at this sample period (s).
-    pub(crate) fn at_period(self, period_s: f64) -> Self {
-        match self {
-            Self::Diverged { record, sample, .. } => Self::Diverged {
-                record,
-                sample,
-                // Without the digits of a binary period.
-                time: (1e9 * sample as f64 * period_s).round() / 1e9,
-            },
-            other => other,
-        }
-    }
 }
 
 /// The input signals of a model, from their first sample on.
@@ -427,7 +410,6 @@ impl Model {
             .map_err(|sample| SimulateError::Diverged {
                 record: record.name.clone(),
                 sample,
-                time: record.t0 + sample as f64 * record.sample_period_s,
             })
     }
 }

@@ -84,18 +84,10 @@ pub fn diagnose(
     interrupt: &AtomicBool,
     progress: &(dyn Fn(&str) + Sync),
 ) -> Result<Diagnosis, DiagnoseError> {
-    // The search runs in other units of time.
-    let chosen = |records: &[Record]| {
-        let chosen = chosen(given, records, options, interrupt, progress);
-        chosen.map_err(|error| match error {
-            DiagnoseError::Simulate(error) => error.at_period(given.sample_period_s).into(),
-            other => other,
-        })
-    };
     let Some((chosen_by, kept)) = kept_back(records) else {
-        return chosen(records);
+        return chosen(given, records, options, interrupt, progress);
     };
-    let diagnosis = chosen(&chosen_by)?;
+    let diagnosis = chosen(given, &chosen_by, options, interrupt, progress)?;
     let quoted = Quoted::of(given, &diagnosis.model, &kept);
     Ok(Diagnosis {
         quoted,

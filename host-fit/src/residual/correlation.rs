@@ -30,20 +30,20 @@ pub(crate) fn independent_block(errors: &[impl AsRef<[f64]>]) -> usize {
     samples.clamp(RULES.shortest_block, longest.max(RULES.shortest_block))
 }
 
-/// The correlation time of a block of [`independent_block`], samples; at least 1.
-pub(crate) fn correlation_times(block: usize) -> f64 {
+/// The correlation length of a block of [`independent_block`], samples; at least 1.
+pub(crate) fn correlation_length(block: usize) -> f64 {
     (block as f64 / RULES.correlation_times).max(1.0)
 }
 
 /// p-value of "the sum of these independent blocks is above 0". Their scatter is estimated from the median absolute
 /// deviation, so that an error in few blocks does not inflate it. 1 for fewer than three blocks.
-pub(crate) fn p_above(blocks: Vec<f64>) -> f64 {
+pub(crate) fn p_above(blocks: &[f64]) -> f64 {
     let n = blocks.len() as f64;
     if n < 3.0 {
         return 1.0;
     }
     let mean = blocks.iter().sum::<f64>() / n;
-    let middle = median(blocks.clone());
+    let middle = median(blocks.to_vec());
     let deviation = median(blocks.iter().map(|x| (x - middle).abs()).collect());
     student(mean, NORMAL * deviation / n.sqrt(), n - 1.0)
 }

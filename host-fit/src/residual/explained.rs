@@ -238,7 +238,7 @@ fn gains(
 /// The sum over independent blocks; 0 if it is not this many standard errors above 0, by [`p_above`].
 pub(super) fn beyond_chance(gains: &[f64], standard_errors: f64) -> f64 {
     let level = Normal::standard().sf(standard_errors);
-    match p_above(gains.to_vec()) < level {
+    match p_above(gains) < level {
         true => gains.iter().sum(),
         false => 0.0,
     }

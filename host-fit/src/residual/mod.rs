@@ -15,7 +15,7 @@ mod trend;
 mod words;
 
 pub use coordinate::FailureCoordinate;
-pub(crate) use correlation::{correlation_times, independent_block, p_above, student};
+pub(crate) use correlation::{correlation_length, independent_block, p_above, student};
 pub use explained::Dependence;
 pub use noise::NoiseSource;
 pub use rules::{RULES, Rules};
@@ -225,7 +225,7 @@ fn is_above(errors: &Errors) -> bool {
             .skip(errors.lead[record])
             .sum::<f64>();
     }
-    blocks.iter().sum::<f64>() > RULES.least_excess * noise && p_above(blocks) < RULES.above_level
+    blocks.iter().sum::<f64>() > RULES.least_excess * noise && p_above(&blocks) < RULES.above_level
 }
 
 /// The cycle that explains most; its multiples explain equally much and are not preferred.

@@ -381,3 +381,27 @@ impl Controlled for NoStress {
         match *self {}
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_finished_model_leads_to_a_law_or_to_an_export() {
+        let flow = Model {
+            a: vec![0.97],
+            b: vec![0.024],
+            ..Model::default()
+        };
+        // The flow ends at 0.8.
+        assert_eq!(
+            command_after(&flow),
+            "host-fit design model.toml DATASET --target 0.4 -o controlled.toml"
+        );
+        let slow = Model {
+            sample_period_s: 1.0,
+            ..flow
+        };
+        assert!(command_after(&slow).starts_with("host-fit codegen model.toml --lang python"));
+    }
+}

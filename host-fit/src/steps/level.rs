@@ -4,6 +4,7 @@ use super::{Answer, Tone, verdict::times};
 use crate::analysis::{Correlation, Residuals, correlations};
 use crate::baseline::BaselineFits;
 use crate::data::{Record, Use};
+use crate::diagnose::RULES;
 use crate::indicators::{Indicators, Scores};
 use crate::order;
 use crate::picture::significant;
@@ -31,17 +32,21 @@ pub(super) fn error_name(role: Use) -> &'static str {
     }
 }
 
+/// Share of a cross-correlation that chance alone leaves outside its 95 % band.
+const EXPECTED: f64 = 0.05;
+
 /// The residual test of an output-error model: the share of lags at which the cross-correlation of u and the residual
 /// lies outside its 95 % band. The autocorrelation is no test here, because measurement noise may be coloured.
 fn residual_test((_, cross): &(Correlation, Correlation), above_noise: bool) -> String {
-    let small = match cross.outside > 0.1 && !above_noise {
+    let small = match cross.outside > 2.0 * EXPECTED && !above_noise {
         true => " A response to u is missing that is smaller than the noise.",
         false => "",
     };
     format!(
-        "Residual test: {:.0} % of the cross-correlation with u lies outside its 95 % band (5 % expected of a complete \
+        "Residual test: {:.0} % of the cross-correlation with u lies outside its 95 % band ({:.0} % expected of a complete \
          model).{small}",
-        100.0 * cross.outside
+        100.0 * cross.outside,
+        100.0 * EXPECTED
     )
 }
 
@@ -124,8 +129,7 @@ pub(super) fn extended(
         || "It diverged before".to_owned(),
         |before| format!("It was {} before", beside_noise(before)),
     );
-    // Errors that agree in the printed digits.
-    let is_lower = before.is_none_or(|before| after.rmse < 0.995 * before.rmse);
+    let is_lower = before.is_none_or(|before| (1.0 + RULES.alike) * after.rmse < before.rmse);
     let (tone, change) = match is_lower {
         true => (Tone::Finding, "is lower"),
         false => (Tone::Warning, "is not lower"),

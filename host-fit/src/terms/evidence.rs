@@ -2,7 +2,7 @@
 //! gain expected under noise alone.
 
 use crate::linalg::dot;
-use crate::residual::{correlation_times, independent_block, p_above, student};
+use crate::residual::{correlation_length, independent_block, p_above, student};
 
 /// Free-run error y − y_sim of a model on the validation records, without the warm-up.
 #[derive(Clone, Debug)]
@@ -42,7 +42,7 @@ impl HeldOut {
 
     /// Correlation length: number of samples per independent sample.
     pub(crate) fn correlated(&self) -> f64 {
-        correlation_times(self.block)
+        correlation_length(self.block)
     }
 
     /// Block length in samples; blocks count as independent.
@@ -106,7 +106,7 @@ pub(crate) fn p_above_noise(held_out: &HeldOut, variance: &[Vec<f64>], margin: f
             excess.push(dot(errors, errors) - margin * variance.iter().sum::<f64>());
         }
     }
-    p_above(excess)
+    p_above(&excess)
 }
 
 #[cfg(test)]

@@ -687,3 +687,47 @@ fn least_of(all: &[Hypothesis], wanted: impl Fn(&usize) -> bool) -> Option<usize
         .filter(wanted)
         .min_by(|a, b| all[*a].score().total_cmp(&all[*b].score()))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::data::{Record, Use};
+    use crate::model::Delay;
+    use crate::terms::Bench;
+    use model_core::effects::{ConstantDelay, spec};
+    use model_core::recursion::Grading;
+
+    /// A motor whose driver has a dead zone. The base without the curve of the input has six times its gain, and diverges
+    /// with the curve.
+    #[test]
+    fn a_base_that_diverges_with_a_kept_effect_gives_way_to_the_given_one() {
+        let (mut y, mut speed, mut random, mut level) = (Vec::new(), 0.0, 11_u32, 0.0);
+        let u: Vec<f64> = (0..2800)
+            .map(|k| {
+                if k % 60 == 0 {
+                    random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                    level = [0.0, 0.24, 0.39, 0.55, 0.71, 1.0][(random >> 16) as usize % 6];
+                }
+                level
+            })
+            .collect();
+        for u in &u {
+            y.push(speed);
+            speed += ((u - 0.15_f64).max(0.0) / 0.85 - speed) / 12.0;
+        }
+        let record = Record::new("motor", Use::Identify, 0.001, u, y);
+        let mut given = Model {
+            a: vec![0.9166],
+            b: vec![0.01425],
+            grading: Grading::Interpolated,
+            delay: Delay::of::<ConstantDelay<f64>>(&[0.0], vec![1.0], true),
+            ..Model::default()
+        };
+        let curve = spec("input-nonlinearity").expect("in the catalogue");
+        given.add(curve, &[10.0, -5.19], None);
+        let bench = Bench::of(&given, &[record]).expect("a record to learn from");
+        let never = AtomicBool::new(false);
+        let root = Search::silent(&bench.judge, 0, &never).root(&bench.given, false);
+        assert!(root.expect("stable").judged.rmse() < 0.05);
+    }
+}

@@ -79,7 +79,7 @@ fn ladder_table(ladder: &[Rung]) -> String {
 /// Why the error of the second step is larger than that of the given model; empty if it is not.
 pub(crate) fn ladder_caption(ladder: &[Rung]) -> &'static str {
     match ladder {
-        [given, next, _, ..] if next.validate_rmse > 1.005 * given.validate_rmse => {
+        [given, next, _, ..] if next.validate_rmse > (1.0 + RULES.alike) * given.validate_rmse => {
             "The second step leaves out lags and terms of the given model that could hide an effect; the error is \
              therefore larger there."
         }

@@ -452,7 +452,7 @@ fn bad_input_is_one_paragraph_and_leaves_no_file() {
     refused(
         "compare {} {}",
         &[&diverging, &data("paper-like")],
-        &["diverges", "t ="],
+        &["diverges", "at sample 78"],
     );
     let input = file("in.csv", "t,u\n0,0\n0.001,1\n0.002,x\n");
     let csv = folder.path().join("never.csv");

@@ -117,6 +117,75 @@ impl Sums {
     }
 }
 
+/// The records on which an error is computed. Gives the error and the records their names in every text.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ErrorKind {
+    /// On the records marked `validate`.
+    Validation,
+    /// On the estimation records, because no record is marked `validate`.
+    Estimation,
+    /// On each estimation record, predicted by a model fitted to the others.
+    CrossValidation,
+    /// On the end of the only record, predicted by a model fitted to its beginning.
+    RecordEnd,
+}
+
+impl ErrorKind {
+    /// The error of a model on records with this use.
+    #[must_use]
+    pub fn of(role: Use) -> Self {
+        match role {
+            Use::Validate => Self::Validation,
+            Use::Identify => Self::Estimation,
+        }
+    }
+
+    /// The error of a model on a data set: validation error if a record is marked `validate`, otherwise estimation
+    /// error.
+    #[must_use]
+    pub fn on(records: &[Record]) -> Self {
+        let validate = records.iter().any(|record| record.role == Use::Validate);
+        Self::of(if validate {
+            Use::Validate
+        } else {
+            Use::Identify
+        })
+    }
+
+    /// Name of the error within a sentence, for example "validation error".
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Validation => "validation error",
+            Self::Estimation => "estimation error",
+            Self::CrossValidation => "cross-validation error",
+            Self::RecordEnd => "end-of-record error",
+        }
+    }
+
+    /// [`ErrorKind::name`] with a capital letter, for headings and axes.
+    #[must_use]
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::Validation => "Validation error",
+            Self::Estimation => "Estimation error",
+            Self::CrossValidation => "Cross-validation error",
+            Self::RecordEnd => "End-of-record error",
+        }
+    }
+
+    /// The records on which the error is computed, for example "validation records".
+    #[must_use]
+    pub fn records(self) -> &'static str {
+        match self {
+            Self::Validation => "validation records",
+            Self::Estimation => "estimation records",
+            Self::CrossValidation => "left-out records",
+            Self::RecordEnd => "end of the record",
+        }
+    }
+}
+
 /// Indicators of a model on a data set.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Scores {

@@ -5,6 +5,7 @@ use host_fit::data::Record;
 use host_fit::design::{Margin, Proof};
 use host_fit::diagnose::Diagnosis;
 use host_fit::experiment::Separation;
+use host_fit::indicators::ErrorKind;
 use host_fit::picture::{
     ClosedLoop, LabelledRun, Ladder, LadderRecord, LadderStep, LoopRun, Overlay, Picture, Region,
     Regions, closed_loop, ladder, overlay, regions,
@@ -36,7 +37,12 @@ pub(crate) fn overlays(records: &[Record], runs: &[(&str, &[Vec<f64>])]) -> Vec<
     records.iter().enumerate().map(picture).collect()
 }
 
-/// The validation error step by step, as a picture.
+/// Heading of a ladder, for example "Validation error, step by step".
+pub(crate) fn step_by_step(kind: ErrorKind) -> String {
+    format!("{}, step by step", kind.title())
+}
+
+/// The error step by step, as a picture.
 pub(crate) fn ladder_picture(diagnosis: &Diagnosis) -> Picture {
     let finite = diagnosis
         .ladder
@@ -49,8 +55,11 @@ pub(crate) fn ladder_picture(diagnosis: &Diagnosis) -> Picture {
         })
         .collect();
     let records: [LadderRecord<'_>; 0] = [];
+    let kind = diagnosis.held_out_by.compared();
     ladder(&Ladder {
-        title: "Validation error, step by step",
+        title: &step_by_step(kind),
+        error: kind.title(),
+        scored: kind.records(),
         y_unit: "y",
         steps: &steps,
         records: &records,
@@ -121,7 +130,7 @@ pub(crate) fn proof_picture(proof: &Proof, tracks: bool) -> Picture {
         air: true,
         reference: &reference,
         runs: &runs,
-        // A quarter of a trial: single pulses are seen.
+        // A quarter of a trial, so that single pulses are visible.
         seconds: 0.25 * proof.trace.samples.len() as f64 * proof.trace.sample_period_s,
     })
 }

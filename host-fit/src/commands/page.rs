@@ -3,16 +3,18 @@
 use host_fit::data::{DataSet, Record};
 use host_fit::diagnose::{Diagnosis, RULES};
 use host_fit::discover::{Entry, FoundTerm, TRACED, Trace};
-use host_fit::indicators::{Scores, score};
+use host_fit::indicators::{ErrorKind, Scores, score};
 use host_fit::model::Model;
 use host_fit::picture::{
     BandPoint, Candidate, Column, CurvePlot, Living, Picture, Ranking, Report, Stretches,
-    WhereItFails, curve, ranking,
+    WhereItFails, curve, ranking, significant,
 };
 use host_fit::residual::Failures;
 use host_fit::steps::{Answer, Comparison, Extension, Finding, Identification, SideBySide, Terms};
 
-use super::drawings::{experiment_picture, ladder_picture, margin_picture, proof_picture};
+use super::drawings::{
+    experiment_picture, ladder_picture, margin_picture, proof_picture, step_by_step,
+};
 use super::page_parts::{Run, Stretch, card, checks, stretch_picture, worst_stretch};
 use super::tried::Tried;
 use super::words::{
@@ -58,7 +60,10 @@ pub(crate) fn side_by_side(
     let [first, rest @ ..] = SIDE_BY_SIDE;
     let columns = std::iter::once(Column::Text(first)).chain(rest.map(Column::Number));
     report.table(
-        "Free run against the measurement. RMSE and noise are those of the validation records, if there are any.",
+        &format!(
+            "Free run against the measurement. RMSE and noise are those of the {}.",
+            ErrorKind::on(&records).records()
+        ),
         &columns.collect::<Vec<_>>(),
         &side_by_side_rows(found),
     );
@@ -140,7 +145,8 @@ fn pairs<'a>(runs: &[Run<'a>]) -> Vec<(&'a str, &'a [Vec<f64>])> {
     runs.iter().map(|run| (run.label, run.runs)).collect()
 }
 
-/// Where the last of `runs`, which `found` has compared, fails; all runs record by record, and their residual tests.
+/// The sections of compared models: where the last of `runs` fails (from `found`), all runs record by record, and
+/// the residual tests.
 fn compared(
     report: &mut Report,
     records: &[Record],
@@ -284,7 +290,7 @@ pub(crate) fn discovery_details(
     found: &Terms,
     worst: Option<Stretch>,
 ) {
-    report.section("Validation error, step by step");
+    report.section(&step_by_step(found.discovery.held_out_by.compared()));
     report.table(
         ladder_caption(&found.discovery.ladder),
         &LADDER,
@@ -585,7 +591,7 @@ fn report_failures(report: &mut Report, failures: &Failures) {
 
 pub(super) fn failures_picture(failures: &Failures) -> Picture {
     host_fit::picture::where_it_fails(&WhereItFails {
-        title: "Error of the free run on the validation records",
+        title: &format!("Error of the free run on the {}", failures.kind.records()),
         y_label: "rms error, y",
         views: &failures.views(),
     })
@@ -594,7 +600,7 @@ pub(super) fn failures_picture(failures: &Failures) -> Picture {
 /// The sections of a diagnosis that list its steps and candidates.
 fn report_candidates(report: &mut Report, found: &Finding) {
     let diagnosis = &found.diagnosis;
-    report.section("Validation error, step by step");
+    report.section(&step_by_step(diagnosis.held_out_by.compared()));
     report.table(
         ladder_caption(&diagnosis.ladder),
         &LADDER,
@@ -602,10 +608,7 @@ fn report_candidates(report: &mut Report, found: &Finding) {
     );
     if !diagnosis.ranking.is_empty() {
         report.section("Candidates");
-        report.figure(
-            &ranking_picture(diagnosis),
-            "Each effect alone, refitted together with all other parameters.",
-        );
+        report.figure(&ranking_picture(diagnosis), &candidates_caption(diagnosis));
         report.table(
             "Nats: ln of the Bayes factor of the model with the effect against the model without it. p is family-wise: \
              it is corrected for all models that were tried. Screened only: the first-order estimate was too small to refit.",
@@ -636,13 +639,22 @@ fn report_candidates(report: &mut Report, found: &Finding) {
     }
 }
 
-/// Every candidate's validation error.
+/// How the errors of the candidates and of their base model were obtained.
+fn candidates_caption(diagnosis: &Diagnosis) -> String {
+    let error = diagnosis.held_out_by.judged().name();
+    let runs = diagnosis.restarted_s.map_or_else(
+        || "free runs".to_owned(),
+        |seconds| format!("runs restarted every {} s", significant(seconds, 3)),
+    );
+    format!(
+        "Each effect alone is added to the same base model and refitted together with all other parameters. The grey line \
+         is the base model without the candidate. Both are the {error} of {runs}."
+    )
+}
+
+/// Every candidate's error.
 pub(super) fn ranking_picture(diagnosis: &Diagnosis) -> Picture {
-    let base = diagnosis
-        .ladder
-        .get(1)
-        .or(diagnosis.ladder.first())
-        .map(|rung| rung.validate_rmse);
+    let kind = diagnosis.held_out_by.judged();
     let candidate = |r| {
         let r: &host_fit::diagnose::Ranked = r;
         Candidate {
@@ -662,10 +674,11 @@ pub(super) fn ranking_picture(diagnosis: &Diagnosis) -> Picture {
     let candidates: Vec<Candidate<'_>> =
         named_first(diagnosis).into_iter().map(candidate).collect();
     ranking(&Ranking {
-        title: "Validation error with each effect",
+        title: &format!("{} with each effect", kind.title()),
         y_unit: "y",
+        error: kind.title(),
         candidates: &candidates,
-        base_rmse: base,
+        base_rmse: Some(diagnosis.candidates_base_rmse),
         noise_rmse: diagnosis.ladder.last().and_then(|rung| rung.noise_rmse),
     })
 }

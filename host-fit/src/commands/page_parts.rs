@@ -2,6 +2,7 @@
 
 use host_fit::analysis::{Residuals, correlations, poles, spectrum, step_response};
 use host_fit::data::{Record, Use};
+use host_fit::indicators::ErrorKind;
 use host_fit::model::Model;
 use host_fit::picture::{
     Column, LabelledRun, Line, LinePlot, Overlay, Picture, Report, Tone, lines, overlay,
@@ -138,8 +139,9 @@ pub(crate) fn stretch_figure(
         ..measured(record)
     });
     let caption = format!(
-        "The {} s of the validation records with the largest error. There: {errors}.",
-        significant(stretch.to - stretch.from, 2)
+        "The {} s of the {} with the largest error. There: {errors}.",
+        significant(stretch.to - stretch.from, 2),
+        ErrorKind::of(record.role).records()
     );
     Some((svg, caption))
 }

@@ -195,6 +195,8 @@ pub struct Diagnosis {
     pub quoted: Option<Quoted>,
     /// Validation errors from the given model to the final one.
     pub ladder: Vec<Rung>,
+    /// Validation error of the base model to which each candidate of `ranking` is added, y rms.
+    pub candidates_base_rmse: f64,
     /// All candidates for the final base model, best first.
     pub ranking: Vec<Ranked>,
     /// Parameters of the missing effects, or of the surrogates, in the final model.

@@ -244,6 +244,7 @@ impl Session<'_> {
             noise_estimate: judge.measured_noise_rmse() * units.y,
             level_scatter: judge.level_scatter(),
             ladder,
+            candidates_base_rmse: context.judged.held_out.measured_rmse() * units.y,
             ranking,
             parameters,
             evidence_nats: self.evidence_of(last.judged.model()),
@@ -332,9 +333,9 @@ impl Session<'_> {
     }
 }
 
-/// How many effects, the most important first, are named by the `evidence` of each: nats by which the model has more than
-/// the best model without it, `None` if that cannot be computed. An effect without evidence, and the less important ones
-/// after it, are surrogates.
+/// Number of named effects, counted from the most important one. `evidence` of an effect is that of the model minus
+/// that of the best model without the effect, nats; `None` if it cannot be computed. The first effect with negative
+/// evidence and all after it are surrogates.
 fn evident(evidence: &[Option<f64>]) -> usize {
     let has = |nats: &&Option<f64>| nats.is_none_or(|nats| nats >= 0.0);
     evidence.iter().take_while(has).count()

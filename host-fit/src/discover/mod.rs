@@ -218,10 +218,11 @@ pub fn discover(
         }
     }
     let separation = finder.separation(&terms, &model);
+    let scored = judge.held_out_by.judged().records();
     let terms = terms
         .iter()
         .zip(&written)
-        .map(|(found, written)| outcome::told(found, written, &fitted, units))
+        .map(|(found, written)| outcome::told(found, written, &fitted, units, scored))
         .collect();
     Ok(Discovery {
         terms,

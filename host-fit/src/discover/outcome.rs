@@ -168,8 +168,15 @@ impl Found {
     }
 }
 
-/// A found term for the report; `written` is the reported form in the user's units.
-pub(super) fn told(found: &Found, written: &Term, fitted: &Fit, units: &Units) -> FoundTerm {
+/// A found term for the report; `written` is the reported form in the user's units, `scored` names the records of
+/// its error.
+pub(super) fn told(
+    found: &Found,
+    written: &Term,
+    fitted: &Fit,
+    units: &Units,
+    scored: &str,
+) -> FoundTerm {
     let entry = written.entry;
     let curve = found.curve(units);
     let is_formula = matches!(written.shape, Shape::Formula { .. });
@@ -178,7 +185,7 @@ pub(super) fn told(found: &Found, written: &Term, fitted: &Fit, units: &Units) -
     let place = entry.place();
     let share = |share: f64| 100.0 * share;
     let mut comment = format!(
-        "Found by `host-fit discover`: {} by {}.\nIt explains {:.0} % of the model error above the noise on the validation records; p = {:.1e}.",
+        "Found by `host-fit discover`: {} by {}.\nIt explains {:.0} % of the model error above the noise on the {scored}; p = {:.1e}.",
         entry.words(),
         written.coordinate.words(),
         share(found.formula_taken),

@@ -1,4 +1,4 @@
-//! The ladder: validation error falling, effect by effect, to the noise level.
+//! The ladder: the error of the model after each added effect, against the noise level.
 
 use super::axis::{Axis, extent};
 use super::canvas::{Anchor, Canvas, Ink, MARGIN, Picture, Words, draw, text_width, wrap};
@@ -11,11 +11,11 @@ use super::panel::{LABEL_SIZE, Panel, TICK_SIZE, left_edge};
 pub struct LadderStep<'a> {
     /// Name of the step, for example `"model as given"` or `"+ plenum-droop"`.
     pub label: &'a str,
-    /// Validation RMSE, free run of all records together, in the unit of y.
+    /// RMSE of the free run, all records together, in the unit of y.
     pub rmse: f64,
 }
 
-/// The errors of the models on one validation record.
+/// The errors of the models on one record.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct LadderRecord<'a> {
     /// Name of the record.
@@ -33,7 +33,11 @@ pub struct Ladder<'a> {
     pub y_unit: &'a str,
     /// The steps in order, the given model first.
     pub steps: &'a [LadderStep<'a>],
-    /// The validation records; empty to show them together only.
+    /// Name of the error, with a capital letter, for example `"Validation error"`.
+    pub error: &'a str,
+    /// The records of the error, for example `"validation records"`.
+    pub scored: &'a str,
+    /// Single records; empty to show them together only.
     pub records: &'a [LadderRecord<'a>],
     /// Noise level, rms over all records together.
     pub noise_rmse: Option<f64>,
@@ -41,17 +45,17 @@ pub struct Ladder<'a> {
 
 const HEIGHT: f64 = 300.0;
 
-/// Draws the validation error step by step against the noise level. Returns SVG.
+/// Draws the error step by step against the noise level. Returns SVG.
 #[must_use]
 pub fn ladder(plot: &Ladder<'_>) -> Picture {
-    let description = format!("{}: validation error step by step", plot.title);
+    let description = format!("{}: a column for each step", plot.title);
     draw(&description, |canvas| {
         let noise = plot.noise_rmse.filter(|n| n.is_finite() && *n > 0.0);
         let together = extent(plot.steps.iter().map(|s| s.rmse));
         let Some((_, highest)) = together else {
             return nothing(canvas, plot.title, "No step has an error to draw.");
         };
-        let mut entries = vec![(Swatch::Bar(BLUE), "all validation records".to_owned())];
+        let mut entries = vec![(Swatch::Bar(BLUE), format!("all {}", plot.scored))];
         for (index, record) in plot.records.iter().enumerate() {
             entries.push((Swatch::Dot(record_colour(index)), record.name.to_owned()));
         }
@@ -82,7 +86,10 @@ pub fn ladder(plot: &Ladder<'_>) -> Picture {
             "" => String::new(),
             unit => format!(" ({unit})"),
         };
-        panel.frame(canvas, &format!("Validation RMSE, free run{unit}"));
+        panel.frame(
+            canvas,
+            &format!("{}: RMSE of the free run{unit}", plot.error),
+        );
         let slot = panel.width / plot.steps.len() as f64;
         let half = (slot * 0.34).min(75.0);
         let rungs: Vec<(f64, &LadderStep<'_>)> = plot
@@ -248,6 +255,8 @@ mod tests {
             },
         ];
         let svg = ladder(&Ladder {
+            error: "Estimation error",
+            scored: "estimation records",
             steps: &steps,
             noise_rmse: Some(0.02),
             ..Ladder::default()
@@ -256,6 +265,7 @@ mod tests {
         let words = words(&svg);
         assert!(words.contains("0.1\n") && words.contains("0.025") && words.contains("−75 %"));
         assert!(words.contains("noise level"));
+        assert!(words.contains("all estimation records") && !words.contains("alidation"));
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! Candidate effects ranked by validation error.
+//! Candidate effects ranked by the error of the model with each of them.
 
 use super::axis::{Axis, extent};
 use super::canvas::{Anchor, BOLD, Ink, MARGIN, Picture, Words, draw, fit, text_width};
@@ -13,7 +13,7 @@ use crate::order;
 pub struct Candidate<'a> {
     /// Name of the effect, or of the equivalence set.
     pub name: &'a str,
-    /// Validation RMSE, free run with the candidate added and everything refitted, unit of y.
+    /// RMSE of the free run with the candidate added and everything refitted, unit of y.
     pub rmse: f64,
     /// Lower end of the interval of `rmse`; NaN without an interval.
     pub low: f64,
@@ -32,9 +32,11 @@ pub struct Ranking<'a> {
     pub title: &'a str,
     /// Unit of y; empty for a normalised output.
     pub y_unit: &'a str,
+    /// Name of the error, with a capital letter, for example `"Validation error"`.
+    pub error: &'a str,
     /// Candidates in any order; the best comes first in the picture.
     pub candidates: &'a [Candidate<'a>],
-    /// RMSE of the model that the candidates were added to.
+    /// RMSE of the base model, to which each candidate is added.
     pub base_rmse: Option<f64>,
     /// Noise level, rms.
     pub noise_rmse: Option<f64>,
@@ -47,11 +49,11 @@ const SIZE: f64 = 14.5;
 /// Largest number of rows; the worst candidates are left out.
 const MOST: usize = 60;
 
-/// Draws candidates as dots with intervals, the best on top, between the noise level and
-/// the model without an effect. Returns SVG.
+/// Draws candidates as dots with intervals, the best on top, between the noise level and the error of the base
+/// model. Returns SVG.
 #[must_use]
 pub fn ranking(plot: &Ranking<'_>) -> Picture {
-    let description = format!("{}: candidate effects by validation error", plot.title);
+    let description = format!("{}: a row for each candidate effect", plot.title);
     draw(&description, |canvas| {
         let mut order: Vec<&Candidate<'_>> = plot.candidates.iter().collect();
         order::ascending(&mut order, |one| one.rmse);
@@ -72,7 +74,10 @@ pub fn ranking(plot: &Ranking<'_>) -> Picture {
             entries.push((Swatch::Dashes(INK), "noise level".to_owned()));
         }
         if base.is_some() {
-            entries.push((Swatch::Line(MUTED), "without an effect".to_owned()));
+            entries.push((
+                Swatch::Line(MUTED),
+                "base model without the candidate".to_owned(),
+            ));
         }
         let top = heading(canvas, plot.title, &entries);
 
@@ -183,7 +188,7 @@ pub fn ranking(plot: &Ranking<'_>) -> Picture {
         };
         panel.foot(
             canvas,
-            &format!("Validation RMSE, free run after refitting{unit}"),
+            &format!("{}: RMSE of the free run after refitting{unit}", plot.error),
         );
         panel.bottom() + FOOT
     })
@@ -204,6 +209,7 @@ mod tests {
             ..Candidate::default()
         };
         let svg = ranking(&Ranking {
+            error: "Cross-validation error",
             candidates: &[named("valve-lag", 0.05), named("plenum-droop", 0.02)],
             base_rmse: Some(0.05),
             noise_rmse: Some(0.018),
@@ -213,6 +219,8 @@ mod tests {
         let words = words(&svg);
         let at = |name| words.find(name).unwrap();
         assert!(at("plenum-droop") < at("valve-lag"));
+        assert!(words.contains("base model without the candidate"));
+        assert!(words.contains("Cross-validation error"));
     }
 
     #[test]

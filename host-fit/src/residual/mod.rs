@@ -1,5 +1,4 @@
-//! Where a model fails: its free-run error on validation records, split along each coordinate and compared
-//! with the noise.
+//! Where a model fails: its free-run error, split along each coordinate and compared with the noise.
 
 mod binned;
 mod coordinate;
@@ -23,6 +22,7 @@ pub use trend::Trend;
 pub(crate) use trend::correlation;
 
 use crate::data::{Record, Use};
+use crate::indicators::ErrorKind;
 use crate::model::Model;
 use crate::order;
 use crate::picture::{FailureBin, FailureView};
@@ -85,6 +85,8 @@ pub struct Failures {
     pub noise_rmse: f64,
     /// Where the noise level comes from.
     pub noise_source: NoiseSource,
+    /// The records of the error.
+    pub kind: ErrorKind,
     /// Mean error y − y_sim, in y.
     pub bias: f64,
     /// Whether the error is significantly above the noise.
@@ -203,6 +205,7 @@ pub fn examine(records: &[&Record], simulated: Vec<Vec<f64>>, delay: usize) -> F
         rmse: f64::sqrt(squares / n),
         noise_rmse: errors.noise_rmse(),
         noise_source,
+        kind: ErrorKind::of(records.first().map_or(Use::Identify, |record| record.role)),
         bias: sum / n,
         above_noise,
         by,

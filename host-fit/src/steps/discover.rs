@@ -171,10 +171,7 @@ fn answer(discovery: &Discovery) -> Answer {
         rmse(discovery.ladder.last()),
     );
     let noise = discovery.noise_estimate;
-    let error = match discovery.held_out_by {
-        HeldOutBy::Records => "validation error",
-        HeldOutBy::Turns | HeldOutBy::End => "estimation error",
-    };
+    let error = discovery.held_out_by.compared().name();
     let known = discovery.noise_source != NoiseSource::Scatter && noise > 0.0;
     if discovery.terms.is_empty() {
         let level = match known {

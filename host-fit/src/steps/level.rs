@@ -5,7 +5,7 @@ use crate::analysis::{Correlation, Residuals, correlations};
 use crate::baseline::BaselineFits;
 use crate::data::{Record, Use};
 use crate::diagnose::RULES;
-use crate::indicators::{Indicators, Scores};
+use crate::indicators::{ErrorKind, Indicators, Scores};
 use crate::order;
 use crate::picture::significant;
 use crate::residual::Failures;
@@ -24,14 +24,6 @@ pub(super) fn beside_noise(all: &Indicators) -> String {
     }
 }
 
-/// "validation error", or "estimation error" if no record is marked `validate`.
-pub(super) fn error_name(role: Use) -> &'static str {
-    match role {
-        Use::Validate => "validation error",
-        Use::Identify => "estimation error",
-    }
-}
-
 /// Share of a cross-correlation that chance alone leaves outside its 95 % band.
 const EXPECTED: f64 = 0.05;
 
@@ -39,7 +31,7 @@ const EXPECTED: f64 = 0.05;
 /// lies outside its 95 % band. The autocorrelation is no test here, because measurement noise may be coloured.
 fn residual_test((_, cross): &(Correlation, Correlation), above_noise: bool) -> String {
     let small = match cross.outside > 2.0 * EXPECTED && !above_noise {
-        true => " A response to u is missing that is smaller than the noise.",
+        true => " The model lacks a response to u, which is smaller than the noise.",
         false => "",
     };
     format!(
@@ -61,7 +53,7 @@ pub(super) fn compared(
     let Some(all) = scores.held_out() else {
         return Answer::new(Tone::Warning, "there is no record to compare with");
     };
-    let error = error_name(all.role);
+    let error = ErrorKind::of(all.role).name();
     let answer = if failures.above_noise {
         Answer::new(
             Tone::Warning,
@@ -90,7 +82,7 @@ pub(super) fn identified(scores: &Scores, fits: &BaselineFits, parameters: usize
             "the model cannot be validated: no record can be scored",
         );
     };
-    let error = error_name(all.role);
+    let error = ErrorKind::of(all.role).name();
     let baseline = fits.best().map_or_else(String::new, |(name, fit)| {
         format!(" The best linear baseline ({name}) reaches FIT {fit:.1} %.")
     });
@@ -124,7 +116,7 @@ pub(super) fn extended(
             "the model cannot be validated: no record can be scored",
         );
     };
-    let error = error_name(after.role);
+    let error = ErrorKind::of(after.role).name();
     let was = before.map_or_else(
         || "It diverged before".to_owned(),
         |before| format!("It was {} before", beside_noise(before)),
@@ -151,7 +143,7 @@ pub(super) fn ranked<'a>(models: impl Iterator<Item = (&'a str, &'a Scores)>) ->
     let Some((name, best)) = judged.first() else {
         return Answer::new(Tone::Warning, "there is no record to compare with");
     };
-    let error = error_name(best.role);
+    let error = ErrorKind::of(best.role).name();
     let next = judged.get(1).map_or_else(String::new, |(other, second)| {
         format!(" Next best: {other}, {}.", beside_noise(second))
     });

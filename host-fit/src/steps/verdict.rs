@@ -83,14 +83,6 @@ pub(super) fn beyond(glance: &Glance) -> String {
     )
 }
 
-/// Name of the error in the ladder.
-fn error_name(diagnosis: &Diagnosis) -> &'static str {
-    match diagnosis.held_out_by {
-        HeldOutBy::Records => "validation error",
-        HeldOutBy::Turns | HeldOutBy::End => "estimation error",
-    }
-}
-
 /// An error relative to the noise level, if that is known: "1.01 × the noise level (RMSE 0.0104)".
 fn beside_noise(rmse: f64, diagnosis: &Diagnosis) -> String {
     let noise = diagnosis.noise_estimate;
@@ -135,7 +127,7 @@ fn finding(diagnosis: &Diagnosis, plant: Plant) -> Answer {
     let rmse = |rung: Option<&Rung>| rung.map_or(f64::NAN, |rung| rung.validate_rmse);
     let first = rmse(diagnosis.ladder.first());
     let last = rmse(diagnosis.ladder.last());
-    let error = error_name(diagnosis);
+    let error = diagnosis.held_out_by.compared().name();
     let now = format!("The {error} is {}.", beside_noise(last, diagnosis));
     let add = |names: &[String]| {
         let effects = names.iter().map(|name| format!(" --effect {name}"));
@@ -243,12 +235,12 @@ fn confidence(diagnosis: &Diagnosis) -> String {
 fn fall(diagnosis: &Diagnosis, with: &str) -> String {
     let rmse = |rung: Option<&Rung>| rung.map_or(f64::NAN, |rung| rung.validate_rmse);
     let [given, last] = [diagnosis.ladder.first(), diagnosis.ladder.last()].map(rmse);
-    let error = error_name(diagnosis);
+    let error = diagnosis.held_out_by.compared().name();
     let fewest = diagnosis.ladder.get(1);
     let lags_do = last > (1.0 - RULES.worthwhile) * given;
     match fewest.filter(|rung| lags_do && rung.effects.is_empty()) {
         Some(fewest) => format!(
-            "With the fewest lags, {with} lowers the {error} {}; without it, additional lags fit equally well.",
+            "On the model with the fewest lags, {with} lowers the {error} {}. Additional lags in its place fit equally well.",
             from_to(rmse(Some(fewest)), last, diagnosis)
         ),
         None => format!(
@@ -357,7 +349,8 @@ fn records(answer: &mut Answer, diagnosis: &Diagnosis, judged_rmse: Option<f64>)
     } else if diagnosis.held_out_by != HeldOutBy::Records
         && let Some(rmse) = judged
     {
-        answer.note(format!("Cross-validation error: RMSE {rmse}."));
+        let kind = diagnosis.held_out_by.judged();
+        answer.note(format!("{}: RMSE {rmse}.", kind.title()));
     }
     if let Some(scatter) = diagnosis.level_scatter {
         answer.note(format!(

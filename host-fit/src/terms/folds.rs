@@ -4,6 +4,7 @@
 use super::RULES;
 use crate::data::{Record, Use};
 use crate::fit::{pieces, pieces_of};
+use crate::indicators::ErrorKind;
 
 /// One split into estimation and validation samples.
 #[derive(Clone, Debug)]
@@ -46,7 +47,7 @@ impl Fold {
     }
 }
 
-/// How the validation error is obtained.
+/// The records by which models are compared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum HeldOutBy {
@@ -56,6 +57,27 @@ pub enum HeldOutBy {
     Turns,
     /// One record only: estimated on its beginning, validated on its end.
     End,
+}
+
+impl HeldOutBy {
+    /// The error by which hypotheses are compared.
+    #[must_use]
+    pub fn judged(self) -> ErrorKind {
+        match self {
+            Self::Records => ErrorKind::Validation,
+            Self::Turns => ErrorKind::CrossValidation,
+            Self::End => ErrorKind::RecordEnd,
+        }
+    }
+
+    /// The error of a written model, as `compare` prints it.
+    #[must_use]
+    pub fn compared(self) -> ErrorKind {
+        match self {
+            Self::Records => ErrorKind::Validation,
+            Self::Turns | Self::End => ErrorKind::Estimation,
+        }
+    }
 }
 
 /// The folds of a data set; none without estimation records.
@@ -110,7 +132,7 @@ pub(crate) fn folds(records: &[Record]) -> (Vec<Fold>, HeldOutBy) {
     ((0..count).map(fold).collect(), HeldOutBy::Turns)
 }
 
-/// The first sample whose command is not that of the sample before it.
+/// The first sample whose command differs from that of the preceding sample.
 fn first_edge(u: &[f64]) -> Option<usize> {
     Some(u.windows(2).position(|pair| pair[0] != pair[1])? + 1)
 }
@@ -154,6 +176,10 @@ mod tests {
         let set = [record("a", Use::Identify), record("b", Use::Validate)];
         let (folds, by) = folds(&set);
         assert_eq!(by, HeldOutBy::Records);
+        assert_eq!(
+            (by.judged(), by.compared()),
+            (ErrorKind::Validation, ErrorKind::Validation)
+        );
         assert_eq!(folds.len(), 1);
         assert_eq!(names(&folds[0]), (vec!["a"], vec!["b"]));
     }
@@ -165,6 +191,10 @@ mod tests {
             .into();
         let (folds, by) = folds(&set);
         assert_eq!(by, HeldOutBy::Turns);
+        assert_eq!(
+            (by.judged(), by.compared()),
+            (ErrorKind::CrossValidation, ErrorKind::Estimation)
+        );
         let mut judged: Vec<&str> = folds.iter().flat_map(|fold| names(fold).1).collect();
         judged.sort_unstable();
         assert_eq!(judged, ["a", "b", "c", "d", "e"]);
@@ -208,13 +238,18 @@ mod tests {
     fn the_only_record_is_judged_at_its_end() {
         let (folds, by) = folds(&[record("a", Use::Identify)]);
         assert_eq!(by, HeldOutBy::End);
+        assert_eq!(
+            (by.judged(), by.compared()),
+            (ErrorKind::RecordEnd, ErrorKind::Estimation)
+        );
         assert_eq!(folds[0].learning[0].len(), 6);
         assert_eq!(folds[0].learning[0].channels["u_inf"].len(), 6);
         assert_eq!(folds[0].judging[0].from, 6);
         assert_eq!(folds[0].judging[0].record.len(), 10);
     }
 
-    /// Otherwise the estimation part of a step test with a long rest would contain the rest only.
+    /// A single record is split after its first edge, so that the estimation part of a step test with a long rest
+    /// contains the step.
     #[test]
     fn the_only_record_is_divided_from_its_first_edge_on() {
         let mut late = record("a", Use::Identify);

@@ -2,6 +2,7 @@
 
 use super::{Words, aligned, lines, short};
 use host_fit::diagnose::{Diagnosis, ParameterEstimate, RULES, Ranked, Rung};
+use host_fit::indicators::ErrorKind;
 use host_fit::residual::Failures;
 use host_fit::steps::{Finding, Terms, p_bound};
 use model_core::effects::spec;
@@ -9,7 +10,13 @@ use model_core::effects::spec;
 impl Words for Finding {
     fn words(&self) -> String {
         let mut told = vec![self.answer.words()];
-        told.push(format!("\n{}", ladder_table(&self.diagnosis.ladder)));
+        told.push(format!(
+            "\n{}",
+            ladder_table(
+                &self.diagnosis.ladder,
+                self.diagnosis.held_out_by.compared()
+            )
+        ));
         if !self.diagnosis.ranking.is_empty() {
             told.push(format!("\n{}", ranking_table(&self.diagnosis)));
         }
@@ -29,7 +36,13 @@ impl Words for Finding {
 impl Words for Terms {
     fn words(&self) -> String {
         let mut told = vec![self.answer.words()];
-        told.push(format!("\n{}", ladder_table(&self.discovery.ladder)));
+        told.push(format!(
+            "\n{}",
+            ladder_table(
+                &self.discovery.ladder,
+                self.discovery.held_out_by.compared()
+            )
+        ));
         for term in &self.discovery.terms {
             let head = [
                 format!("{} ({})", term.coordinate, term.coordinate_unit),
@@ -66,9 +79,10 @@ pub(crate) fn ladder_rows(ladder: &[Rung]) -> Vec<Vec<String>> {
     ladder.iter().map(row).collect()
 }
 
-/// The ladder of validation errors as an aligned table.
-fn ladder_table(ladder: &[Rung]) -> String {
-    let head = ["validation error, step by step", "RMSE", "FIT %", "noise"];
+/// The ladder of errors as an aligned table.
+fn ladder_table(ladder: &[Rung], kind: ErrorKind) -> String {
+    let steps = format!("{}, step by step", kind.name());
+    let head = [steps.as_str(), "RMSE", "FIT %", "noise"];
     let table = aligned(&head, &ladder_rows(ladder), 1);
     match ladder_caption(ladder) {
         "" => table,

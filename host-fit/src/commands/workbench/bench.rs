@@ -1,4 +1,4 @@
-//! The state of the project for the page, and the ways in which models enter it.
+//! The state of the project for the page, and the actions that add models to the project.
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use host_fit::data::Use;
-use host_fit::indicators::score;
+use host_fit::indicators::{ErrorKind, score};
 use host_fit::model::Model;
 use host_fit::picture::{Ladder, LadderStep, Picture, ladder, packed, significant, workbench_page};
 use host_fit::steps::{self, Comparison, ImportedSet};
@@ -17,6 +17,7 @@ use super::data::{Data, Uploads};
 use super::own::OwnEffects;
 use super::request::Line;
 use crate::commands::demo::bundled_ramp;
+use crate::commands::drawings::step_by_step;
 use crate::commands::page_parts::{
     POLES, POLES_ARE, Run, check_figures, pole_rows, stretch_figure, worst_stretch,
 };
@@ -294,8 +295,10 @@ impl ModelBench {
         read.unwrap_or_default()
     }
 
-    /// The validation error from the first model of a branch to this one.
+    /// The error from the first model of a branch to this one.
     fn ladder(&self, id: u32) -> Picture {
+        let data = self.data();
+        let kind = ErrorKind::on(data.as_ref().map_or(&[], |data| &data.set.records));
         let project = lock(&self.project);
         let mut path = Vec::new();
         let mut at = Some(id);
@@ -315,7 +318,9 @@ impl ModelBench {
             })
             .collect();
         ladder(&Ladder {
-            title: "Validation error, step by step",
+            title: &step_by_step(kind),
+            error: kind.title(),
+            scored: kind.records(),
             y_unit: "y",
             steps: &steps,
             records: &[],

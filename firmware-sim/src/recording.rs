@@ -141,7 +141,7 @@ impl Session<'_> {
     }
 }
 
-/// These commands with many levels if an effect requires them or the input is `graded`; otherwise unchanged, on/off.
+/// The given on/off commands, changed to many levels if an effect requires it or the input is `graded`.
 pub(crate) fn with_levels(
     commands: Vec<(Command, Use)>,
     effects: &[Effect],

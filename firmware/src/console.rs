@@ -285,7 +285,7 @@ mod tests {
             }
             lines
         };
-        // One for the change of mode; the others are periodic, ten per second at any sample period.
+        // One line reports the change of mode; the others are periodic, ten per second at any sample period.
         assert_eq!(
             [200, 1000, 10_000, 100_000].map(&mut lines),
             [1, 3, 25, 250]

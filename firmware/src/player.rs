@@ -11,7 +11,7 @@ use wire::request::checksum;
 /// Largest number of runs in a command: 4 kB, several minutes of switching at a valve's shortest times.
 pub const RUNS: usize = 1024;
 
-/// Why a command is not played, with a detail of the status.
+/// Reason for not playing a command: the status and its detail.
 pub type Refusal = (Status, u32);
 
 /// The command and the player's position.

@@ -1,11 +1,10 @@
 //! Bilinear input–output model with state-dependent input delay, physical
 //! effects around it, for hosts and microcontrollers alike.
 //!
-//! The model is that of M. Feingesicht, C. Raibaudo, A. Polyakov, F. Kerhervé
-//! and J.-P. Richard, *A bilinear input-output model with state-dependent delay
-//! for separated flow control*, ECC 2016; equation numbers in this crate are
-//! those of the paper. [`model::step`] is the whole of it: host, simulation and
-//! firmware call the same function, so equal constants give equal bits.
+//! The model is that of M. Feingesicht, C. Raibaudo, A. Polyakov, F. Kerhervé and J.-P. Richard, *A bilinear
+//! input-output model with state-dependent delay for separated flow control*, ECC 2016; equation numbers in this
+//! crate are those of the paper. [`model::step`] is the complete model. Host, simulation and firmware call the same
+//! function, so equal constants give equal bits.
 //!
 //! The crate is `no_std`, does not allocate, has no unsafe code and cannot panic. Time, noise and measurements are
 //! arguments; they are never read inside.

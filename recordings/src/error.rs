@@ -267,7 +267,7 @@ pub enum DataProblem {
     },
     /// The sampling periods from the times and as stated differ.
     #[error(
-        "the rows are {found} s apart by their times, but {by} {stated} s; correct the one that is wrong"
+        "the times of the rows are {found} s apart, but {by} {stated} s; correct the wrong one"
     )]
     PeriodMismatch {
         /// Sampling period from the time column, s.

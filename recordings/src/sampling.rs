@@ -411,7 +411,7 @@ mod tests {
         let long: Vec<usize> = (200..320).collect();
         let times = without(printed(1000, 0.0099, 3), &[&[40, 41], &long[..]].concat());
         assert_eq!(found(&times, None), [(40, 2.0), (198, 120.0)]);
-        // One lost row of a clock of whole seconds, whose rounding would explain it; more are rounding.
+        // A clock of whole seconds: a single missing second is a lost row, several are rounding.
         let times = without(whole(600, 1.0, 1.0, 0.0), &[300]);
         assert_eq!(found(&times, None), [(300, 1.0)]);
         assert_eq!(found(&whole(600, 1.01, 1.0, 0.0), None), []);

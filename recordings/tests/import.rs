@@ -307,7 +307,7 @@ fn replace(bytes: &[u8], from: &[u8], to: &[u8]) -> Vec<u8> {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 1500, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// Whatever is done to a file, its import ends in valid records or in an error of one paragraph.
+    /// The import of a changed file ends in valid records or in an error of one paragraph.
     #[test]
     fn damaged_files_never_panic(
         which in 0..FILES.len(),
@@ -337,7 +337,7 @@ proptest! {
     }
 }
 
-/// As it stands in the file, unit included.
+/// A variable can be named as in the file, with its unit.
 #[test]
 fn a_variable_is_found_by_its_heading() {
     let by = |t: &str, u: &str| {

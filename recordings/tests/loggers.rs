@@ -48,7 +48,7 @@ fn refused(content: &str, parts: &[&str]) {
     assert!(!error.contains('\n'), "one paragraph: {error}");
 }
 
-/// The 400 rows that all logs but that of the serial monitor hold.
+/// The 400 rows of all logs except that of the serial monitor.
 fn reference() -> (Vec<f64>, Vec<f64>) {
     let text = fs::read_to_string(stranger("logs/epochms.csv")).unwrap();
     let rows = text.lines().skip(1).map(|line| {
@@ -207,7 +207,7 @@ fn times_of_every_kind_give_the_same_period() {
     );
 }
 
-/// Stamps of whole seconds of a clock that is a little slow, and of one that is read several times a second.
+/// Stamps of whole seconds: of a clock that is slightly slow, and of a clock that is read several times a second.
 #[test]
 fn rounded_stamps_miss_no_sample() {
     let found = read(&[stranger("rounded-clock/log.csv")], &Import::default());
@@ -226,7 +226,7 @@ fn rounded_stamps_miss_no_sample() {
         assert_eq!(found.set.sample_period_s, period);
         assert!(found.set.records[0].channels.is_empty());
     }
-    // Every other command reads the unchanged file too, and so the data set made of it.
+    // The file is a data set by itself, and equal to the imported one.
     let alone = DataSet::load(&stranger("rounded-clock/log.csv")).unwrap();
     assert_eq!(alone.records[0].len(), 599);
     let folder = tempfile::tempdir().unwrap();
@@ -283,10 +283,7 @@ fn clocks_that_agree_within_a_sample_make_one_set() {
     let error = import(&[&fast], &with(|m| m.period_s = Some(2.0)))
         .unwrap_err()
         .to_string();
-    assert!(
-        error.contains("1 s apart by their times, but --period is 2 s"),
-        "{error}"
-    );
+    assert!(error.contains("1 s apart, but --period is 2 s"), "{error}");
     let found = import(
         &[&fast],
         &with(|m| {
@@ -394,7 +391,7 @@ fn short_gaps_are_filled_and_long_ones_named() {
                 "lasts 0.3 s, longer than --fill-gaps 0.25",
             ],
         ),
-        // The gap of y goes on beside the lost rows.
+        // The gap of y continues across the lost rows.
         (
             0.35,
             &[(5, "0.5,1,,5\n"), lost[1], lost[2]],

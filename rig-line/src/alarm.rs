@@ -244,7 +244,8 @@ mod tests {
         (0..runs).filter(|seed| stopped(*seed)).count()
     }
 
-    /// At a probability of 0.2 in 200 blocks; each run learns its own baseline. The bound N/c is close to the count.
+    /// False alarms at a stated probability of 0.2 in 200 blocks; each run learns its own baseline. The count is
+    /// close to the bound N/c.
     #[test]
     fn false_alarms_are_as_rare_as_stated() {
         let test = test_of(0.2, 200.0, 60);

@@ -243,7 +243,7 @@ fn shortest(
     match first_that(&lengths(longest), &mut answers)? {
         Some(length) => Ok(length as f64 * period),
         None => Err(LineError::Calibration(format!(
-            "the flow does not respond to any {what} up to {} s; allow longer ones, or more of them",
+            "the flow does not respond to any {what} up to {} s; check the air supply, or average over more pulses (--pulses)",
             times.longest_pulse
         ))),
     }
@@ -264,8 +264,8 @@ fn lengths(longest: usize) -> Vec<usize> {
         .collect()
 }
 
-/// The first of `lengths` with a response, if all longer ones have a response: doubling steps, then bisection, because
-/// each test takes a quarter of a minute.
+/// The shortest of `lengths` with a response, if all longer ones have a response too. Found by doubling, then
+/// bisection, because each test takes a quarter of a minute.
 fn first_that(
     lengths: &[usize],
     answers: &mut impl FnMut(usize) -> Result<bool, LineError>,

@@ -490,7 +490,7 @@ fn check(info: &Info) -> Result<(), LineError> {
 /// Why the board refuses, with the remedy.
 fn reason(status: Status, detail: u32) -> String {
     match status {
-        Status::Busy => "another host uses it; end that one first".into(),
+        Status::Busy => "another host uses the board; end that host first".into(),
         Status::TooLong => {
             format!("it stores at most {detail} runs; play the command in shorter pieces")
         }

@@ -63,8 +63,8 @@ fn a_good_line_loses_nothing() {
     assert!(!hands.is_open.load(Ordering::Relaxed));
 }
 
-/// A million samples over a line that damages a byte in five thousand: each
-/// sample came or is known to be missing, and what is kept is whole.
+/// A million samples over a line that damages a byte in five thousand: each sample is received or known to be
+/// missing, and every stored repeat is complete.
 #[test]
 fn a_bad_line_loses_nothing_unnoticed() {
     let (hands, line) = board();
@@ -80,9 +80,9 @@ fn a_bad_line_loses_nothing_unnoticed() {
         let recording = recording.expect("a recording");
         whole(&command, &kept);
         assert_eq!(recording.cut_short, None);
-        // What was played is what came and what is known to be missing.
+        // Every played sample is received or known to be missing.
         let played = recording.samples + recording.lost();
-        // Only where a go was broken off is the end of it not played.
+        // The end of the command is missing only if an attempt was aborted.
         let broken = recording.parts.iter().filter(|p| p.ended != "played");
         let broken = broken.count();
         assert!(broken <= 1 && (broken > 0 || played % command.samples() == 0));
@@ -160,7 +160,7 @@ fn a_host_that_dies_leaves_no_valve_open() {
     first.load(&runs).expect("loaded");
     first.play(&runs, 1).expect("played");
     let _ = first.next(std::time::Duration::from_millis(50));
-    // It neither reads nor speaks any more; time goes on without it.
+    // The host neither reads nor writes; the board continues.
     drop(first);
     let until = std::time::Instant::now() + std::time::Duration::from_secs(20);
     loop {
@@ -186,7 +186,7 @@ fn two_hosts_do_not_mix() {
     let runs = [10, 20_000, 10];
     first.load(&runs).expect("loaded");
     first.play(&runs, 1).expect("played");
-    // The same line: a second host speaks, and cannot play.
+    // A second host sends on the same line, but cannot play.
     let frame = wire::request::Request {
         number: 1,
         session: 6,
@@ -224,7 +224,7 @@ fn what_no_board_can_play_is_refused_with_the_reason() {
     assert!(refused(&mut host, &short).contains("hold time"));
     let long = Command::new("long", 0.001, (0..90_000).map(|k| k / 30 % 2 == 1));
     assert!(refused(&mut host, &long).contains("3000 runs"));
-    // A law that hears a flow that does not answer.
+    // A law on a flow that does not respond.
     host.arm().expect("armed");
     let message = refused(&mut host, &command(1000));
     assert!(
@@ -233,7 +233,7 @@ fn what_no_board_can_play_is_refused_with_the_reason() {
     );
 }
 
-/// What the rig in the thread is, is found.
+/// The calibration finds the properties of the simulated rig.
 #[test]
 fn a_rig_is_calibrated() {
     let (hands, line) = board();
@@ -295,7 +295,7 @@ fn a_loop_is_watched_logged_and_judged() {
         Some(&log),
         &mut |now| {
             if now.t > 40.0 {
-                // A fifth of what latches a fault.
+                // A fifth of the shift that latches a fault.
                 hands.shift.store(200, Ordering::Relaxed);
             } else {
                 seen.push(now.verdict);
@@ -312,8 +312,8 @@ fn a_loop_is_watched_logged_and_judged() {
     let Some(Verdict::Stopped { at_s, .. }) = watched.verdict else {
         panic!("{watched:?}");
     };
-    // The judgement counts the time of the law, from the second second on. The shift comes when this thread has heard of
-    // the 40th second, which the emulated board may have left behind by then.
+    // The time of the verdict counts from the start of the law, one second after the start. The shift is set when
+    // this thread receives the 40th second; the emulated board may be ahead of it.
     assert!((39.0..50.0).contains(&at_s), "{at_s}");
     assert_eq!((watched.lost_samples, watched.logged), (0, 10_000));
     assert!(watched.rms_error.is_some_and(|e| e < 0.2), "{watched:?}");

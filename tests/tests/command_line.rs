@@ -260,7 +260,7 @@ fn simulate_is_the_models_free_run() {
     assert_eq!(written.lines().count(), 3001);
 }
 
-/// That part of the bundled set, saved into `folder`; the page of the first ten minutes is tested on the whole set.
+/// A third of the bundled set, saved into `folder`. The test of docs/start.md uses the whole set.
 fn part_of_the_ramp(folder: &Path) -> PathBuf {
     let path = folder.join("ramp");
     let set = DataSet::load(&data("hidden-ramp")).expect("bundled");

@@ -244,8 +244,8 @@ fn an_effect_of_the_flow_is_found_with_its_parameters() {
     is_found_with_its_parameters(&row);
 }
 
-/// Hysteresis alone imitates the friction as well, and friction added to it then gains nothing: they are found in
-/// the other order.
+/// Hysteresis alone imitates the friction as well, and friction added to it gains nothing. The pair is found with
+/// the friction first.
 #[test]
 #[ignore = "90 s of processor time: cargo xtask kept-rigs"]
 fn two_effects_of_which_one_imitates_both_are_found() {

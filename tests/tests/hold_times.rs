@@ -70,7 +70,7 @@ proptest! {
         let mut hold = Hold::closed();
         let valve: Vec<bool> = wanted.iter().map(|w| hold.pass(&times, *w)).collect();
         kept(times, &valve)?;
-        // It delays requests and adds none: the valve only moves to a requested position.
+        // The guard delays requests and adds none: the valve only moves to a requested position.
         for (k, on) in valve.iter().enumerate() {
             let before = k > 0 && valve[k - 1];
             prop_assert!(*on == before || *on == wanted[k]);

@@ -408,7 +408,7 @@ fn ctrl_c_ends_every_command() {
             let mut child = child.expect("the program starts");
             std::thread::sleep(Duration::from_secs_f64(after));
             let works = child.try_wait().expect("a child").is_none();
-            // It may have ended by itself.
+            // The process may have ended by itself.
             let _ = Command::new("kill")
                 .args(["-INT", &child.id().to_string()])
                 .stderr(Stdio::null())
@@ -464,7 +464,7 @@ fn checking_a_text_keeps_nothing() {
         );
         assert!(Definition::check(&text, "t").is_ok());
     }
-    // Kept, they would be 500 MB.
+    // If the inputs were kept, they would take 500 MB.
     let grown = resident().saturating_sub(before);
     assert!(grown < 100_000, "{grown} kB");
 }

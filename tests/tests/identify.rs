@@ -88,7 +88,7 @@ fn a_seed_repeats_bit_for_bit_with_any_number_of_threads() {
             for changing in ["wall_time_s", "model"] {
                 document[changing] = Value::Null;
             }
-            // It names the model's file.
+            // The next command contains the name of the model's file.
             document["answer"]["next"] = Value::Null;
             (document.to_string(), model)
         };
@@ -206,7 +206,7 @@ fn an_interrupt_keeps_the_best_so_far() {
     assert!(is_written);
 }
 
-/// A search that is interrupted after that time.
+/// A search that is interrupted after the given time.
 #[cfg(unix)]
 fn interrupted_after(seconds: f64, model: &Path) -> Output {
     // Ten lags take minutes.

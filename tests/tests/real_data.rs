@@ -222,7 +222,7 @@ fn the_flow_over_a_ramp_is_described_by_stand_ins() {
             _ => Use::Identify,
         };
     }
-    // What `identify` makes of the three.
+    // The model that `identify` finds on the three records.
     let given = Model {
         sample_period_s: records[0].sample_period_s,
         state_lags: vec![1, 40],

@@ -29,7 +29,7 @@ fn bundled_sets_are_answered_right() {
     all_right(&options(Vec::new(), &[]), 14);
 }
 
-/// As good as the best baseline, and printed as in the written file.
+/// The model is as good as the best baseline, and the printed errors are those of the written file.
 #[test]
 #[ignore = "measured sets, which are not part of the project: cargo xtask kept-rigs"]
 fn measured_sets_are_no_worse_than_the_baselines() {

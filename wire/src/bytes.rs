@@ -2,7 +2,7 @@
 
 use heapless::Vec;
 
-/// Content that is being written; content that does not fit is cut off, which the sizes of the messages exclude.
+/// Content that is being written. Content beyond the capacity is cut off; the sizes of the messages exclude this.
 pub(crate) struct Writer<const N: usize>(pub(crate) Vec<u8, N>);
 
 impl<const N: usize> Writer<N> {

@@ -1,4 +1,4 @@
-//! What the board answers.
+//! The board's answers.
 
 use crate::bytes::{Reader, Writer};
 use crate::frame::{CONTENT, Frame};
@@ -46,7 +46,7 @@ pub enum Status {
     NotDisarmed = 7,
     /// A setting outside its bounds: the valve is shut and the fault latched.
     Outside = 8,
-    /// The change before is not complete: a ramp to a target, or the shortest time shut after a pause.
+    /// The preceding change is not complete: a ramp to a target, or the shortest time shut after a pause.
     Pending = 9,
     /// The law has no such setting.
     NoSetting = 10,
@@ -71,7 +71,7 @@ impl Status {
     ];
 }
 
-/// What the board is doing.
+/// State of the board.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Phase {
     /// Valves shut.
@@ -149,7 +149,7 @@ pub struct Info {
     pub hold: [u32; 2],
     /// From counts to the channel's unit; all zero if the model needs none.
     pub channel: Scale,
-    /// What the board does.
+    /// State of the board.
     pub phase: Phase,
     /// Samples since the start.
     pub samples: u64,
@@ -178,7 +178,7 @@ pub struct Settings {
 pub const NO_LIMIT: u16 = 1000;
 
 impl Settings {
-    /// Those of a law without any.
+    /// The settings of a law that has none.
     pub const NONE: Self = Self {
         target: f32::NAN,
         reachable: [f32::NAN; 2],
@@ -213,11 +213,11 @@ pub enum Answer {
     Info(Info),
     /// To [`Ask::Settings`](crate::request::Ask::Settings).
     Settings(Settings),
-    /// To anything else.
+    /// To any other request.
     Done {
-        /// How it ended.
+        /// How the request ended.
         status: Status,
-        /// What the status says more.
+        /// Detail of the status; its meaning depends on the status.
         detail: u32,
         /// Samples from the board's start to the execution.
         samples: u64,
@@ -227,11 +227,11 @@ pub enum Answer {
 /// An answer with the number and session of its request.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reply {
-    /// The request's.
+    /// Copied from the request.
     pub number: u16,
-    /// The request's.
+    /// Copied from the request.
     pub session: u32,
-    /// What is answered.
+    /// The answer.
     pub answer: Answer,
 }
 

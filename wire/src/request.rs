@@ -32,7 +32,7 @@ pub enum Ask<'a> {
     Play {
         /// How often.
         repeats: u32,
-        /// Its number of runs.
+        /// Number of runs of the command.
         runs: u16,
         /// [`checksum`] of its runs, so that the played command is the intended one.
         checksum: u32,

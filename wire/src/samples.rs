@@ -189,7 +189,7 @@ pub struct Samples<'a> {
     pub session: u32,
     /// Number of its first sample, from the stream's beginning.
     pub first: u32,
-    /// What the board did.
+    /// State of the board at this sample.
     pub phase: Phase,
     /// y* at its first sample; `None` without a law, or with one that has none.
     pub reference: Option<f32>,
@@ -366,7 +366,7 @@ mod tests {
         }
     }
 
-    /// The table in the crate's documentation.
+    /// The numbers of the table in the crate's documentation.
     #[test]
     fn the_stream_fits_the_line_at_1_khz() {
         let sizes = [

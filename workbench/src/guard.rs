@@ -1,4 +1,4 @@
-//! Access control: only this machine and the page of this run, and no other page through it.
+//! Access control: requests are accepted only from this machine and from the page of this run.
 //!
 //! A browser also runs pages of other sites, and these can reach loopback. Three checks exclude them. The token of
 //! this run is only in the opened address. The `Host` header cannot be forged by a name that was rebound to
@@ -43,7 +43,7 @@ impl Guard {
     fn check(&self, request: &Request) -> Result<(), &'static str> {
         let headers = request.headers();
         let text = |name: &HeaderName| headers.get(name).map(|v| v.to_str().unwrap_or("\0"));
-        // One `Host`, and ours.
+        // Exactly one `Host` header, which is the server's own address.
         let single = headers.get_all(HOST).iter().count() == 1;
         if !(single && text(&HOST).is_some_and(|host| self.own(host))) {
             return Err("this address does not belong to the workbench; open the printed one");

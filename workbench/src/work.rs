@@ -101,7 +101,7 @@ impl Work {
         );
     }
 
-    /// Something to know.
+    /// A warning for the user.
     pub fn warning(&self, words: &str) {
         self.tell(&json!({"kind": "warning", "words": words}));
     }

@@ -39,7 +39,7 @@ fn bench_step(_arguments: &[String]) -> Result<()> {
     let mut objects = Vec::new();
     for (source, options) in [
         (&source, &["-O3"][..]),
-        // As its page says.
+        // The options recommended on the page of the export.
         (&exported, &["-std=c99", "-O2", "-ffp-contract=off"]),
     ] {
         let object = source.with_extension("o");

@@ -28,7 +28,7 @@ pub enum Fault {
 }
 
 impl Fault {
-    /// The names [`Fault::draw`] knows.
+    /// Names accepted by [`Fault::draw`].
     pub const NAMES: &'static [&'static str] =
         &["missing-pulse", "freezing-sensor", "sticking-valve"];
 

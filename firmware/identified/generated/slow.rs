@@ -212,7 +212,7 @@ const _: () = {
     );
     assert!(
         LOOK_AHEAD >= checks::look_ahead(& LAW, FIRST_ARRIVAL),
-        "the law's prediction horizon is shorter than delay, valve and anticipation together"
+        "the law's prediction horizon is shorter than the sum of dead time, valve delay and anticipation"
     );
 };
 /// Decisions of the law in its reference run, bit for bit as computed on the host.

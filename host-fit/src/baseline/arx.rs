@@ -224,7 +224,7 @@ pub(super) fn fit(
     delays.dedup();
     let less = |a: &(f64, Arx), b: &(f64, Arx)| a.0.total_cmp(&b.0);
     let mut best = delays.into_iter().filter_map(cost).min_by(less)?;
-    // Descends from sample to sample.
+    // Descent over the delay, one sample at a time.
     for _ in 0..longest_delay.min(40) {
         let here = best.1.delay;
         let beside = [

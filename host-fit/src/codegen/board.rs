@@ -43,7 +43,7 @@ pub enum BoardError {
     /// The sample period is outside the range of the timers.
     #[error(
         "key `sample_period_s`: the board samples every {} to {} ms, not every {period} s. \
-         Identify the model from records of another period.",
+         Identify the model from records with a sampling period in this range.",
         f64::from(SHORTEST_US) * 1e-3, f64::from(LONGEST_US) * 1e-3
     )]
     Period {

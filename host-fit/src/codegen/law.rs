@@ -128,13 +128,13 @@ fn tracking(law: &Track) -> TokenStream {
             );
             assert!(
                 LOOK_AHEAD >= checks::look_ahead(&LAW, FIRST_ARRIVAL),
-                "the law's prediction horizon is shorter than delay, valve and anticipation together"
+                "the law's prediction horizon is shorter than the sum of dead time, valve delay and anticipation"
             );
         };
     }
 }
 
-/// Computed by the code that designs and simulates the law.
+/// Checksum of the tracking law's self-test, computed by the code that designs and simulates the law.
 fn golden_track(model: &Model, law: &Tracking<f32>) -> Result<u32, CodegenError> {
     let prepared = model.prepare::<f32>();
     let longest = u16::try_from(model.longest_delay()).unwrap_or(u16::MAX);

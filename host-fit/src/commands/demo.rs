@@ -74,7 +74,7 @@ const FILES: [(&str, &str); 16] = [
 const ANSWER: &str = include_str!("../../data/hidden-ramp/answer.toml");
 /// Hidden effect outside the catalogue, seed of its rig, and folder of its recordings.
 const BEYOND: (&str, u64, &str) = ("tiring-jet", 4, "tiring-ramp");
-/// The records, of eight, that suffice to find the term: the search takes half the time.
+/// Five of the eight records, which suffice to find the term in half the time.
 const BEYOND_RECORDS: [&str; 5] = ["step", "sq4-80", "sq2-30", "sq5-40", "sq2-60"];
 /// Friction to hold in the loop (y), about 0.8 of steady blowing.
 const TARGET: f64 = 0.7;

@@ -58,8 +58,8 @@ pub(crate) struct Console {
 }
 
 impl Console {
-    /// Prints a result: in words, with the files that were `written`, or as the one JSON document, which names the
-    /// files of `keys` before the result's own keys.
+    /// Prints a result: in words with the names of the `written` files, or as one JSON document. The document has
+    /// the files of `keys` first, then the result's own keys.
     pub(crate) fn show<T: Words + Serialize>(
         self,
         result: &T,
@@ -68,7 +68,8 @@ impl Console {
     ) -> anyhow::Result<()> {
         #[derive(Serialize)]
         struct Document<'a, T> {
-            /// As text: JSON strings must be UTF-8, but no file is refused because of its name.
+            /// The paths are stored as text, because JSON strings are UTF-8. A name that is not UTF-8 is not
+            /// refused.
             #[serde(flatten)]
             files: BTreeMap<&'a str, Cow<'a, str>>,
             #[serde(flatten)]

@@ -123,8 +123,8 @@ pub(crate) fn fits(rig: &RigFile, model: &Model) -> Result<(), String> {
         let counts = needed.reference / channel.per_count + channel.zero_counts;
         if !(channel.lower_rail_counts < counts && counts < channel.upper_rail_counts) {
             return Err(format!(
-                "`channel` and the model's reference of it: {} {} would read {counts:.0} counts, which is at a rail; is the unit \
-                 the same?",
+                "`channel` and the model's reference of it: {} {} would read {counts:.0} counts, which is at an \
+                    end of the converter's range; check the unit",
                 needed.reference, channel.unit
             ));
         }

@@ -43,7 +43,8 @@ pub(crate) struct Series {
     pub(crate) switching: Switching,
     /// The first used sample: earlier ones respond to commands before the record.
     pub(crate) from: usize,
-    /// ρ of the filter 1 − ρ·z⁻¹ that y has passed, and that responses pass before they are compared with it.
+    /// ρ of the prewhitening filter 1 − ρ·z⁻¹. It was applied to y, and is applied to responses before they are
+    /// compared with y.
     pub(crate) whitening: f64,
 }
 

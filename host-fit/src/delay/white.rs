@@ -5,8 +5,8 @@ use crate::data::rounding_variance;
 /// A sample counts as an outlier if it is this many standard deviations of the white noise away from both neighbours.
 const OUTLIER: f64 = 6.0;
 
-/// Variance of white noise in some records, from the median of the squared second differences of y, to which
-/// responses contribute only in few samples; at least that of the rounding of y, which may hide the noise.
+/// Variance of white noise in some records, from the median of the squared second differences of y: responses
+/// change these only in few samples. At least the variance of the rounding of y.
 pub(crate) fn white_noise<'a>(records: impl Iterator<Item = &'a [f64]> + Clone) -> f64 {
     let rounding = rounding_variance(records.clone());
     let differences = records.flat_map(|y| y.windows(3));

@@ -20,7 +20,8 @@ use model_core::effect::Place;
 use model_core::recursion::Grading;
 use serde::Serialize;
 
-/// Where the flow of a law ends on its model. Serialises to `certificate` of `design --json`.
+/// Ultimate bound: the interval in which y ends when the law controls its model. Serialises to `certificate` of
+/// `design --json`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(untagged)]
 pub enum Certificate {

@@ -11,7 +11,8 @@ rules! {
 
     /// Length of the runs whose means are compared to decide whether a model has settled.
     settled_mean: usize = 2000, "samples", "two seconds at 1 kHz";
-    /// A model has settled if its mean changes by less than this between two such runs.
+    /// A model has settled if its mean changes by less than this from one run of `settled-mean` samples to the
+    /// next.
     settled: f64 = 1e-4, "share of the mean", "judgement";
     /// Longest time allowed for settling.
     longest_wait: usize = 60_000, "samples", "judgement";
@@ -96,14 +97,14 @@ rules! {
     /// Iterations of a fit with another delay law.
     law_iterations: usize = 10, "", "judgement";
     /// Smallest size of an effect that is tried.
-    smallest_size: f64 = 0.015_625, "share of its largest usual size", "judgement: 1/64";
+    smallest_size: f64 = 0.015_625, "share of the effect's largest usual size", "judgement: 1/64";
     /// Number of sizes of an effect that are tried.
     sizes: usize = 9, "", "judgement: six doublings, three halvings";
     /// White sensor noise in trials on the model.
     white_noise: f64 = 0.03, "y, friction of order one", "a hot film";
     /// Coloured sensor noise in trials on the model.
     coloured_noise: f64 = 0.035, "y, friction of order one", "a hot film";
-    /// Correlation time of that noise.
+    /// Correlation time of the coloured sensor noise.
     noise_memory: f64 = 20.0, "samples", "a hot film at 1 kHz: 20 ms";
 
     /// If the target does not pass, this many equal parts of the reachable interval are tried as
@@ -135,8 +136,7 @@ rules! {
     long_until: usize = 240_000, "samples", "four minutes at 1 kHz";
     /// A mean that differs from the scored one by more than this is another motion.
     same_mean: f64 = 0.05, "share of the mean", "judgement";
-    /// A range that exceeds the scored one by more than half of itself, or by more than this, is another
-    /// motion.
+    /// A motion whose range exceeds the scored range by more than half, or by more than this, is another motion.
     same_range: f64 = 0.25, "y", "judgement";
     /// The value of an optimum is the lowest on flows that are slower and faster by the inverse of this.
     detuned: u32 = 50, "samples", "judgement: a resonance sharper than 2 % does not survive on a rig";

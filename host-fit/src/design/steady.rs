@@ -66,8 +66,8 @@ pub fn steady(model: &Model, on: bool) -> Result<Steady, DesignError> {
     })
 }
 
-/// From the arrival of an edge to 1 − 1/e of the way between the levels `low` and
-/// `high`, opening and closing, s: from a sample to ten thousand ([`closed_loop::span`]).
+/// Attachment and separation time, s: from the arrival of an edge until y has covered 1 − 1/e of the distance
+/// between the levels `low` and `high`. One to ten thousand samples ([`closed_loop::span`]).
 #[must_use]
 pub fn time_constants(model: &Model, low: f64, high: f64) -> [f64; 2] {
     let bench = Player::<f64>::of(model);

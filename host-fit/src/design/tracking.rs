@@ -74,13 +74,13 @@ pub struct TrackDesign {
     /// The duty that the law takes on the model.
     #[serde(rename = "duty_on_model")]
     pub duty: f64,
-    /// Where the flow ends on the model, if that can be proven.
+    /// Ultimate bound of y on the model, if one can be proven.
     pub certificate: Certificate,
     /// Remarks for the user.
     pub remarks: Vec<String>,
 }
 
-/// What on/off blowing can hold on a model.
+/// Steady states of a model with the valve closed and open, and the levels of y between them.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Held {
     natural: Steady,

@@ -184,7 +184,8 @@ impl Session<'_> {
         })
     }
 
-    /// The certificate of each effect of `subject`: the evidence of that model over the largest of all models that contain neither the effect nor another member of its equivalence set.
+    /// The certificate of each effect of `subject`: the evidence of `subject` over the largest evidence of a model
+    /// with neither the effect nor another member of its equivalence set.
     pub(super) fn certificates(
         &self,
         subject: &Hypothesis,

@@ -17,8 +17,8 @@ pub(crate) struct Given<'a, E> {
 }
 
 impl Search<'_> {
-    /// Whether the lags that the user chose are kept: graded commands and records that start in mid-run are not a
-    /// flow with jets.
+    /// Whether the search keeps the lags that the user chose: with graded commands and records that start in
+    /// mid-run, because these are not records of a flow with jets.
     pub(crate) fn keeps_lags(&self, given: &Model, mid_run: bool) -> bool {
         mid_run && given.start == Start::Measured && !self.judge.on_off
     }

@@ -19,14 +19,14 @@ rules! {
     /// Share of the samples outside the first and the last point.
     beyond: f64 = 0.01, "share of the samples", "judgement";
     /// Least distance of a point to the next, relative to its distance from the first point.
-    apart: f64 = 0.05, "of the way from the first point", "judgement: rests and times since edges span three decades";
+    apart: f64 = 0.05, "share of the distance from the first point", "judgement: rests and times since edges span three decades";
     /// A curve is refitted if its predicted gain is at least this share of the practical margin.
     promised: f64 = 0.5, "share", "judgement: the first-order gain is smaller than the gain after a refit";
     /// Curves that are fitted for a few iterations per round.
     tried: usize = 10, "", "judgement";
     /// Curves that are fitted for a few iterations, for each base of lower order than the best.
     tried_leaner: usize = 4, "", "judgement";
-    /// Most of these curves that have the same place and kind of coordinate.
+    /// Most curves fitted for a few iterations that have the same place and kind of coordinate.
     of_a_kind: usize = 2, "", "judgement: memories of neighbouring lengths have similar gains";
     /// Curves refitted in full, in addition to the best of each place and each base.
     finished: usize = 4, "", "judgement";
@@ -35,7 +35,8 @@ rules! {
     settled: usize = 2, "", "judgement: each of these searches takes as long as `identify`";
     /// Rounds in which the coordinate of the best candidate of a place is chosen again with its lags.
     rounds: usize = 2, "", "judgement: the second round never found anything new";
-    /// A candidate takes part in those rounds if its error is within this factor of the best.
+    /// The coordinate of a place's best candidate is chosen again (`rounds`) if its error is within this factor of
+    /// the best.
     in_reach: f64 = 1.5, "times the best error", "judgement: after its lags were searched, a hot jet improved \
          from 1.5 to 1.05 × the noise level";
     /// The best candidate of a place is also compared as a formula if its error is within this factor of the best.

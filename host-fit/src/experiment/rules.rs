@@ -13,7 +13,7 @@ rules! {
     /// Number of periods of square waves that are tried.
     periods: u32 = 14, "", "judgement";
     /// Longest period of a square wave.
-    longest_period: f64 = 0.4, "share of the run", "two periods before the rest";
+    longest_period: f64 = 0.4, "share of the run", "two periods fit before the rest at the end";
     /// Duty cycles of square waves.
     duties: [f64; 5] = [0.15, 0.3, 0.5, 0.7, 0.85], "", "a grid";
     /// Number of single pulses that are tried.

@@ -14,8 +14,8 @@ use model_core::effect::Sign;
 use model_core::{Output, Real, pairs};
 use std::ops::ControlFlow;
 
-/// Lanes of a run, one of them for the value. The last run uses the fewest lanes that suffice for the remaining
-/// derivatives.
+/// Numbers of dual parts of a run: the value and the derivatives that are computed together. The last run uses the
+/// smallest number that suffices for the remaining derivatives.
 const FEW: usize = 8;
 const SOME: usize = 12;
 const MANY: usize = 20;

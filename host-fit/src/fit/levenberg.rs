@@ -63,9 +63,7 @@ impl FitStop {
             Self::IterationLimit => {
                 "stopped at the iteration limit: more iterations may lower the error further"
             }
-            Self::NoDescent => {
-                "stopped because no step lowers the error, before a minimum of its linearisation"
-            }
+            Self::NoDescent => "stopped before a minimum: no step lowers the error further",
             Self::Diverged => {
                 "stopped because the sensitivities of the free run grow without bound"
             }

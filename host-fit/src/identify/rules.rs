@@ -25,13 +25,13 @@ rules! {
     most_free_kicks: usize = 12, "kicks", "tuned on sets 1 to 3 of docs/search.md";
     /// Probability that a kick also moves the input delays.
     kicked_inputs: f64 = 0.3, "", "tuned on sets 1 to 3 of docs/search.md";
-    /// After such a kick a one-step search scans the input delays within this distance.
+    /// After a kick that moves the input delays, a one-step search scans them within this distance.
     kick_reach: f64 = 12.0, "samples", "tuned on sets 1 to 3 of docs/search.md";
     /// Largest move of input delays in a kick of the free-run search.
     free_kick_reach: f64 = 5.0, "samples", "tuned on sets 1 to 3 of docs/search.md";
     /// Lags that a kick of the free-run search replaces.
     kicked_lags: usize = 2, "lags", "tuned on sets 1 to 3 of docs/search.md";
-    /// Least distance of a lag that replaces another in such a kick.
+    /// Least distance between a lag and its replacement in a kick of the free-run search.
     kick_distance: u16 = 4, "samples", "a descent reaches nearer lags by itself";
     /// Number of predicted minima per slot that are simulated.
     minima: usize = 7, "lags", "judgement";

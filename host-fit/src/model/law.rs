@@ -219,7 +219,7 @@ impl Law {
                 if !checks::train(law.period, &pulses, law.hold) {
                     return fault(
                         "pulses",
-                        "are outside the period, too close or too short for `law.hold`",
+                        "must lie within the period, with lengths and gaps that `law.hold` permits",
                     );
                 }
                 if !law.air_price.is_finite() {

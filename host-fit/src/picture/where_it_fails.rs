@@ -164,7 +164,7 @@ fn title(canvas: &mut Canvas, panel: &Panel, view: &FailureView<'_>) {
         canvas.text(Words::new(13.5, colour), below, &text);
     }
     let name = match view.unit {
-        // As "level of y" has it.
+        // Some names end in their unit, for example "level of y".
         unit if view.coordinate.ends_with(unit) => view.coordinate.clone(),
         unit => format!("{} ({unit})", view.coordinate),
     };

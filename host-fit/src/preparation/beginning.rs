@@ -441,7 +441,7 @@ mod tests {
         assert_eq!((own.rest, own.follow), (80, 0));
     }
 
-    /// The reference of a second-order plant has a longer dead time than its first motion.
+    /// A second-order plant moves before the dead time of its first-order reference has passed.
     #[test]
     fn a_record_that_answers_its_edge_sooner_than_the_reference_rests_until_the_edge() {
         let u: Vec<f64> = (0..900)

@@ -142,8 +142,8 @@ impl Preparation {
         }
         if self.own_row {
             remarks.push(
-                "y responds to the command of its own row: the command is read one row earlier, as on the \
-                 board, where y is read before the command is set."
+                "y responds to the command of its own row. The command is therefore read one row earlier, because \
+                    models and boards read y before they set the command."
                     .to_owned(),
             );
         }

@@ -140,7 +140,7 @@ struct NoiseAtRest {
 }
 
 impl NoiseAtRest {
-    /// Estimated from the standard errors of y. For a record without them, the residual of the reference response,
+    /// Noise from the standard errors of y. For a record without them, the residual of the reference response,
     /// `left`, is an upper limit.
     fn of(rests: &Rests, left: impl FnOnce() -> f64) -> Self {
         let stated: Option<Vec<f64>> = rests
@@ -546,7 +546,7 @@ mod tests {
         let records = [("a", 0.0), ("b", 0.006), ("c", -0.005)].map(|(n, zero)| resting(n, zero));
         let moves = |left: f64| MovingZero::of(&records, &[short; 3], 0.0, || left).is_some();
         assert!(moves(0.006));
-        // As much slow noise as the difference of the offsets.
+        // Slow noise as large as the difference of the offsets.
         assert!(!moves(0.02));
     }
 

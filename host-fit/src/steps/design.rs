@@ -45,7 +45,7 @@ pub struct Design {
     /// Size of y; the rules of the design assume 1.
     #[serde(skip)]
     pub(crate) size: f64,
-    /// Sensor noise in units of a typical hot film's.
+    /// Sensor noise as a multiple of a typical hot film's noise.
     #[serde(skip)]
     pub(crate) noise: f64,
 }

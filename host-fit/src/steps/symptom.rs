@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 /// Parameters of an effect by name.
 pub(super) type Estimates = BTreeMap<String, ParameterEstimate>;
 
-/// What is said of an effect beside its card.
+/// Texts on an effect in addition to its card.
 #[derive(Clone, Copy)]
 struct Symptom {
     effect: &'static str,

@@ -75,10 +75,10 @@ fn joined(records: &[Record], of: impl Fn(&Record) -> Vec<f64>) -> Vec<f64> {
     records.iter().flat_map(of).collect()
 }
 
-/// For each channel of all `records` that varies, that no effect of the catalogue reads, and that is not a copy of
-/// y, the command or a clock: the effect that adds its response to the reading. The response is a first-order lag
-/// with dead time of the channel's deviation from its first value, as a fraction of its range. The reading's zero
-/// is that of a record at rest, when the channel had that value.
+/// An effect for each measured channel of `records`: it adds a response to the channel to the reading. A channel
+/// must be in all records, vary, not be read by an effect of the catalogue, and not be a copy of y, the command or
+/// a clock. The response is a first-order lag with dead time of the channel's deviation from its first value, as a
+/// fraction of its range. At rest the channel has its first value and the response is 0.
 #[must_use]
 pub(crate) fn measured_inputs(records: &[Record]) -> Vec<&'static Definition> {
     let Some(first) = records.first() else {

@@ -27,7 +27,7 @@ pub(crate) fn baselines(frame: &Model, records: &[&Record]) -> Vec<Model> {
 fn linear(frame: &Model, a: Vec<f64>, b: Vec<f64>, constant: f64, delay: f64) -> Model {
     let lags: Vec<u16> = (1..=a.len() as u16).collect();
     let whole = delay.max(0.0);
-    // Several inputs have fixed delays: the factors of a law are relative to a delay that may be 0.
+    // Several inputs have fixed delays. A law would need factors relative to the first delay, which may be 0.
     let delays: Vec<u16> = (0..b.len() as u16)
         .map(|later| (whole.round().clamp(0.0, 60_000.0) as u16) + later)
         .collect();

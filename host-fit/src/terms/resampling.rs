@@ -55,8 +55,8 @@ fn sums(models: &[&HeldOut], record: usize, block: usize) -> Vec<Vec<f64>> {
         .collect()
 }
 
-/// Whether a model with share `own` is excluded because it wins so much less often than the best (inflated argmax
-/// of two; Adrian, Soloff and Willett, arXiv 2410.18268).
+/// Whether the model at index `own` is excluded, because its share of won resamples is too far below the largest
+/// share (inflated argmax of two; Adrian, Soloff and Willett, arXiv 2410.18268).
 pub(crate) fn is_out(shares: &[f64], own: usize) -> bool {
     let most = shares.iter().copied().fold(0.0, f64::max);
     shares[own] <= most - RULES.inflation / std::f64::consts::SQRT_2
@@ -87,8 +87,8 @@ mod tests {
         assert!(shares[0] > 0.99 && !is_out(&shares, 0));
     }
 
-    /// A gain that only one of three records shows disappears in more than a quarter of the resamples; an otherwise
-    /// equal model stays excluded.
+    /// The best model wins only because of one of three records. It loses in more than a quarter of the resamples,
+    /// but the other models stay excluded.
     #[test]
     fn a_gain_in_one_record_is_less_stable() {
         let good = noise(4, 1.0);

@@ -53,7 +53,7 @@ rules! {
     most_given: usize = 6, "terms", "judgement: each of them is tested for removal at the end";
     /// Effects that are tried in place of another term.
     in_its_place: usize = 3, "", "judgement: the true effect is first or second in the screening";
-    /// Such a replacement is tried if its predicted error is below this factor.
+    /// An effect is tried in place of another term if its predicted error is below this factor.
     promising: f64 = 2.0, "times the error", "eight rigs: the error after a brief fit was at least 0.7 × the predicted one";
     /// A replacement is refitted in full if its error after a few iterations is within this factor of the model's.
     in_reach: f64 = 1.2, "times the error", "judgement: a valve lag in place of a film lag has 1.15 times the error after the first iterations";
@@ -83,13 +83,13 @@ rules! {
     linear_better: f64 = 0.03, "share of the rms error", "judgement: an inverse response has a larger error";
     /// Most evaluations of the mesh adaptive direct search for the delays of a chosen structure.
     settling: usize = 300, "", "judgement: each evaluation is a brief fit; a structure with five delays needs 60 to 150";
-    /// Iterations of the parameter fit at each evaluation of that search.
+    /// Iterations of the parameter fit at each evaluation of the direct search for the delays.
     settling_iterations: usize = 2, "iterations", "judgement: each fit starts from the best parameters so far";
-    /// How far a lag may move in that search.
+    /// Largest move of a lag in the direct search for the delays.
     settling_reach: f64 = 0.25, "share of the lag", "judgement: larger moves are made by the search over terms";
-    /// Smallest allowed move of a lag in that search.
+    /// Least range of the moves of a lag in the direct search for the delays.
     settling_least: usize = 8, "samples", "the step of the grid on which lags are screened";
-    /// Initial frame size of that search.
+    /// Initial frame size of the direct search for the delays.
     settling_frame: f64 = 0.25, "share of each variable's range", "judgement: the starting point is near the optimum";
     /// A delay law whose delay varies by less than this over the levels of the records is a constant delay.
     least_rise: f64 = 1.0, "samples", "rounding to whole samples hides a smaller variation";
@@ -122,7 +122,7 @@ rules! {
     slope: f64 = 0.1, "", "judgement: small, and far above rounding";
     /// A term whose effect is not proportional to its amplitude must be predicted to need at least this
     /// multiple of its grid size.
-    some: f64 = 0.1, "times its size in the grid", "judgement";
+    some: f64 = 0.1, "times the amplitude in the grid", "judgement";
     /// Ridge regularisation of curve points that the data rarely visit.
     ridge: f64 = 1e-4, "share of the mean square of the points", "judgement";
     /// Candidates whose changes of the free run correlate more than this are refitted as possible

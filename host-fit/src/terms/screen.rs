@@ -348,8 +348,8 @@ impl<'a> Screen<'a> {
         values
     }
 
-    /// Change of the free run by each parameter of an effect, linearised at its values in `other`, which is this model
-    /// with the effect at an amplitude that leaves the run unchanged. `None` if it diverges.
+    /// Derivative of the free run with respect to each parameter of an effect, at its values in `other`. `other` is
+    /// this model with the effect at an amplitude that leaves the run unchanged. `None` if the run diverges.
     fn columns(&self, other: &Model, effect: &str) -> Option<Vec<Vec<f64>>> {
         let coordinates = other.coordinates();
         let own = |name: &str| name.split('.').next() == Some(effect);

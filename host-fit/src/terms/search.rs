@@ -308,8 +308,8 @@ impl Search<'_> {
                     chosen.push((0, true));
                 }
             }
-            // When the search ends, terms are screened for a few rounds on fits with an effect at a bound that have a lower
-            // error than every result: with a further term the effect may leave the bound.
+            // At the end of the search a few more rounds screen terms on fits with an effect at a bound, if their
+            // error is below that of every result. With a further term the effect may leave the bound.
             if chosen.is_empty()
                 && from_bound < RULES.rounds_after
                 && let Some(bent) = least_of(&all, |i| all[*i].bent && !all[*i].expanded)

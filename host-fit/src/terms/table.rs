@@ -36,7 +36,7 @@ struct Rated {
     with: Model,
     /// Change of the free run by the effect on the estimation samples, orthogonal to the model's own sensitivities.
     column: Vec<f64>,
-    /// The components of that change along the directions of the basis, which were subtracted.
+    /// The components of the change along the directions of the basis, which were subtracted from it.
     along: Vec<f64>,
     /// Factor on the effect's amplitude that fits the error best.
     scale: f64,

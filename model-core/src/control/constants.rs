@@ -54,7 +54,7 @@ pub struct Tracking<T> {
 pub enum Unusable {
     /// A share or rate is not within 0–1, or a limit is negative or not finite.
     Constant(&'static str),
-    /// The memory for predictions has fewer samples than the delay, valve and anticipation together.
+    /// The memory for predictions has fewer samples than the sum of dead time, valve delay and anticipation.
     LookAhead,
     /// Tracking needs the full model; an averaged model (eq. 15) does not resolve single switches.
     AveragedModel,
@@ -65,8 +65,8 @@ impl fmt::Display for Unusable {
         match self {
             Self::Constant(name) => write!(f, "`{name}` of the tracking law is out of range"),
             Self::LookAhead => f.write_str(
-                "the law looks ahead over delay, valve and anticipation, which is more samples than it can \
-                 store; use shorter hold times, or a model with a longer sample period",
+                "the law predicts over the sum of dead time, valve delay and anticipation, which is more samples \
+                    than it can store; use shorter hold times, or a model with a longer sample period",
             ),
             Self::AveragedModel => f.write_str(
                 "the tracking law needs a full model; identify without averaging",

@@ -112,8 +112,7 @@ pub trait Effect<T: Real> {
     }
 }
 
-/// An effect with physical parameters: what one file of
-/// [`effects`](crate::effects) defines.
+/// An effect with physical parameters, defined in one file of [`effects`](crate::effects).
 pub trait Physics<T: Real>: Sized {
     /// The effect's identity card.
     const SPEC: Spec;

@@ -59,10 +59,10 @@ mod tests {
     #[test]
     fn it_holds_the_flow_where_the_push_is_less_than_the_friction() {
         let friction: DryFriction<f64> = prepared(&[0.004]);
-        // The push is 0.02 of the remaining distance.
+        // The drive is 0.02 of the remaining distance.
         let s = flow(&friction, |k| if k < 1000 { 0.19 } else { 0.9 });
         assert!(s[..1000].iter().all(|s| *s == 0.0));
-        // It stops where 0.02·(0.9 − s) equals the friction, without chattering.
+        // The flow stops where 0.02·(0.9 − s) equals the friction, without chattering.
         assert!((s[1999] - 0.7).abs() < 1e-3, "{}", s[1999]);
         assert!(s.windows(2).all(|pair| pair[1] >= pair[0]));
         let down = flow(&friction, |_| -0.9);

@@ -83,7 +83,8 @@ impl<T: Real> Physics<T> for SaturatingDelay<T> {
             fields: Some(&["floor", "rise", "level", "bend"]),
             ..LawCard::PLAIN
         }),
-        source: "form like eq. (2) with a finite end; measured edge delays (Fig. 8) do not distinguish the two",
+        source: "a form like eq. (2) that is constant above a level; measured edge delays (Fig. 8) do not \
+            distinguish the two forms",
         ..Spec::PLAIN
     };
 

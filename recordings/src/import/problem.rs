@@ -180,7 +180,7 @@ pub enum ImportProblem {
     ReplacesSource,
     /// A data set that was not imported.
     #[error(
-        "contains no [record.from], so it was not made by `host-fit import`; name a data set that was"
+        "contains no [record.from], so it was not made by `host-fit import`; name a data set that `host-fit import` made"
     )]
     NoMapping,
 }

@@ -18,7 +18,7 @@ use wire::Outbox;
 /// How long the board's line waits for a host that does not read.
 const PATIENCE: Duration = Duration::from_secs(5);
 
-/// What can be done to the board while it runs.
+/// Interventions on the running board.
 #[derive(Clone, Default)]
 pub(crate) struct Hands {
     /// Pulled for good.
@@ -65,16 +65,15 @@ pub(crate) fn gone() -> Result<Host, LineError> {
     Err(LineError::Gone("pulled".into()))
 }
 
-/// The rig's sensor: 900 counts in natural flow, 1800 more under steady blowing,
-/// and noise of ±20. The channel tells the sample's number, so that a slip would
-/// be seen.
+/// The rig's sensor: 900 counts in natural flow, 1800 more under steady blowing, and noise of ±20. The channel
+/// contains the sample's number, so that a shift is detected.
 fn shown(k: u64, friction: f32) -> [u16; 2] {
     let noise = (k.wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 40) % 41;
     let counts = 880.0 + 1800.0 * friction + noise as f32;
     [counts as u16, (k % 4096) as u16]
 }
 
-/// What a valve that opens and shuts in 6 samples lets through.
+/// A valve that opens and shuts in 6 samples, with its flow.
 struct Valve {
     asked: bool,
     since: u32,
@@ -180,11 +179,11 @@ fn run(hands: &Hands, mut line: UnixStream) {
     }
 }
 
-/// The board's end of the line. A host that is kept waiting for a processor is not
-/// one that has stopped reading: its line waits, as no wire would overflow by that.
+/// The board's end of the line. A host that waits for a processor has not stopped reading: the line waits for it,
+/// because a real line would not overflow then.
 #[derive(Default)]
 struct Told {
-    /// Nobody reads any more; found out once, so that the board's time goes on.
+    /// Whether the host has stopped reading. Determined once, so that the board's time continues.
     in_vain: bool,
 }
 

@@ -51,9 +51,9 @@ fn base() -> Model {
 /// How graded commands act in the cases of an effect.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Gradings {
-    /// Each effect in every way.
+    /// Each effect with every kind of graded command.
     All,
-    /// Each effect in one way, and each way in every third effect.
+    /// Each effect with one of the three kinds of graded command, in turn.
     InTurn,
 }
 

@@ -11,7 +11,7 @@ use scenarios::invariances::{Broken, Change, Options, run};
 #[derive(Debug, Parser)]
 #[command(name = "invariances")]
 struct Arguments {
-    /// Number of rigs; each is changed in every way once.
+    /// Number of rigs; every change is applied once to each.
     #[arg(long, default_value_t = 200)]
     cases: u64,
     /// The first rig.

@@ -48,7 +48,7 @@ struct Bench {
 
 type Fault = (&'static str, fn(Bench) -> Result<String>);
 
-/// Runs those alone that depend on the period of the loop.
+/// Option: run only the faults that depend on the period of the loop.
 const TIMED: &str = "--timed";
 const FAULTS: [Fault; 6] = [
     ("a host that stops during a command", dead),
@@ -58,7 +58,7 @@ const FAULTS: [Fault; 6] = [
     ("a board that is reset during a recording", reset),
     ("a disarm typed between frames", typed),
 ];
-/// How many of [`FAULTS`], from the first, depend on the period of the loop.
+/// Number of faults at the start of [`FAULTS`] that depend on the period of the loop.
 const OF_THE_PERIOD: usize = 2;
 
 fn main() -> Result<()> {

@@ -38,7 +38,7 @@ struct Arguments {
     /// Print one JSON document.
     #[arg(long)]
     json: bool,
-    /// Also `extend` and `discover`, and `compare` with the files that they write.
+    /// Also run `extend` and `discover`, and check the files that they write with `compare`.
     #[arg(long)]
     all: bool,
     /// Leave out this command; repeatable.

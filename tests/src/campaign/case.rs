@@ -45,7 +45,7 @@ impl Group {
         Self::Power,
     ];
 
-    /// Its name in keys and on command lines.
+    /// Name of the group in keys and on command lines.
     #[must_use]
     pub fn word(self) -> &'static str {
         match self {
@@ -226,7 +226,7 @@ impl Seeds {
     }
 }
 
-/// One rig in this many with an on/off effect has a graded command nevertheless.
+/// One in this many rigs with an on/off effect has a graded command.
 const GRADED: u32 = 8;
 
 /// The cases of a campaign in random order, so that any first part is a sample of all. Every rig has its own

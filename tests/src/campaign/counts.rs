@@ -28,7 +28,7 @@ pub(super) fn item<R>(text: &mut String, what: &str, rows: &[&R], test: &dyn Fn(
     }
 }
 
-/// "3/4", or nothing of nothing.
+/// Number of rows that pass a test, of all rows: "3/4".
 pub(super) fn share<'a, R>(rows: &[&'a R], test: impl Fn(&'a R) -> bool) -> String {
     let hits = rows.iter().filter(|row| test(row)).count();
     format!("{hits}/{}", rows.len())

@@ -29,17 +29,17 @@ pub struct Program {
     pub threads: usize,
     /// Folder for unsuccessful cases (data set, answer, models, documents); none to discard them.
     pub keep: Option<PathBuf>,
-    /// The part of a rig's records that is used; all if `None`. A fixed decision can be tested faster on a part
-    /// that suffices for it.
+    /// The part of a rig's records that is used; all if `None`. Tests are faster on a part, if it suffices for the
+    /// tested decision.
     pub part: Option<Part>,
 }
 
 /// A part of a rig's records.
 #[derive(Clone, Copy, Debug)]
 pub struct Part {
-    /// These records, by their place …
+    /// Positions of the records that are used.
     pub records: &'static [usize],
-    /// … of each this many samples from the start.
+    /// Number of samples of each record, from its start.
     pub samples: usize,
 }
 
@@ -88,8 +88,8 @@ impl Program {
         }
     }
 
-    /// Runs `fill` in the folder of the case `key`: a kept one, which is removed if `is_right` accepts the result, or a
-    /// temporary one.
+    /// Runs `fill` in a folder for the case `key`. With `keep` the folder is removed only if `is_right` accepts the
+    /// result; otherwise it is temporary.
     pub(super) fn in_folder<R>(
         &self,
         key: &str,

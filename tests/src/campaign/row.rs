@@ -15,7 +15,7 @@ pub struct Found {
     pub truth: f64,
     /// Value in the written model.
     pub found: f64,
-    /// Its symbol of unit.
+    /// Symbol of the parameter's unit.
     #[serde(default)]
     pub unit: String,
     /// The stated 95 % interval; none if there is none.
@@ -24,7 +24,7 @@ pub struct Found {
 }
 
 impl Found {
-    /// Whether it is within the tolerance.
+    /// Whether the found value is within the tolerance.
     #[must_use]
     pub fn is_near(&self) -> bool {
         (self.found - self.truth).abs() <= NEAR * self.truth.abs()
@@ -37,7 +37,7 @@ impl Found {
         Some((low..=high).contains(&self.truth))
     }
 
-    /// Its kind: times, levels of y, or anything else.
+    /// Kind of the parameter: times, levels of y, or anything else.
     #[must_use]
     pub fn kind(&self) -> &'static str {
         match self.unit.as_str() {
@@ -51,9 +51,9 @@ impl Found {
 /// An effect at its detectable size.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PutIn {
-    /// Its name.
+    /// Name of the effect.
     pub effect: String,
-    /// Its amplitude; none if the diagnosis states that any size could stay undetected.
+    /// Amplitude of the effect; none if the diagnosis states that any size could stay undetected.
     pub amplitude: Option<f64>,
 }
 

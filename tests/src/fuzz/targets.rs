@@ -19,7 +19,7 @@ use wire::samples::Samples;
 /// A reader under test.
 #[derive(Clone, Copy)]
 pub struct Target {
-    /// Its name, also of its folder of stored inputs.
+    /// Name of the target and of its folder of stored inputs.
     pub name: &'static str,
     /// Seeds of the mutation.
     pub seeds: fn() -> Vec<Vec<u8>>,

@@ -31,10 +31,10 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
-/// What is to be run.
+/// Options of a run.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// Rigs; each is changed in every way once.
+    /// Number of rigs; every change is applied once to each.
     pub cases: u64,
     /// The first rig.
     pub seed: u64,
@@ -59,17 +59,17 @@ impl Options {
 /// A change that made a difference.
 #[derive(Clone, Debug, Serialize)]
 pub struct Broken {
-    /// What was changed.
+    /// The change of the records.
     pub change: Change,
-    /// Seed of the rig: `--seed` with it alone repeats the rig.
+    /// Seed of the rig; `--seed` with this number repeats the rig.
     pub seed: u64,
     /// The rig and the change with their numbers.
     pub rig: String,
-    /// What differs, one sentence each.
+    /// Differences between the answers, one sentence each.
     pub differs: Vec<String>,
 }
 
-/// What came of it.
+/// Result of a run.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Outcome {
     /// The changes, and on how many rigs each was tried.
@@ -106,7 +106,7 @@ impl Outcome {
     }
 }
 
-/// Tries every change on every rig; `tell` receives each that made a difference when it occurs.
+/// Tries every change on every rig; `tell` receives each change that made a difference, as soon as it is found.
 ///
 /// # Errors
 /// No temporary folder.

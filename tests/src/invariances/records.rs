@@ -22,7 +22,7 @@ pub(super) struct Rig {
 /// Records that are changed.
 #[derive(Clone, Debug)]
 pub(super) struct Base {
-    /// Where they come from.
+    /// Origin of the records, in words.
     pub(super) words: String,
     /// Standard deviation of the noise, y.
     pub(super) noise: f64,

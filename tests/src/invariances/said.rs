@@ -12,7 +12,7 @@ use std::time::Duration;
 const SAME: f64 = 0.02;
 const SCATTER: f64 = 0.15;
 
-/// What the program said.
+/// Answers of the program.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Said {
     /// A command that did not end with exit code 0, with its message.

@@ -71,7 +71,7 @@ pub struct Row {
     pub seconds: f64,
     /// Problems, one sentence each; empty if none.
     pub wrong: Vec<String>,
-    /// Why nothing was run, if so.
+    /// Reason why the case was not run; `None` if it was run.
     pub skipped: Option<String>,
 }
 

@@ -26,7 +26,7 @@ fn the_workbench_finds_what_is_missing_and_loses_nothing() {
     let wider = "(() => { const pane = document.getElementById('left'), before = pane.offsetWidth; document.querySelector('[data-pane=left]').dispatchEvent(new KeyboardEvent('keydown', {key: 'ArrowRight'})); const by = pane.offsetWidth - before; document.querySelector('[data-pane=left]').dispatchEvent(new KeyboardEvent('keydown', {key: 'ArrowLeft'})); return by; })()";
     assert_eq!(page.act(wider), 20);
 
-    // Identify, and see it at work.
+    // Identify, and watch the search.
     page.act(&identify(300));
     page.idles_with(300, 1);
     page.until(20, "document.querySelectorAll('[data-bar]').length > 20 && document.querySelectorAll('.record').length === 4");
@@ -36,7 +36,7 @@ fn the_workbench_finds_what_is_missing_and_loses_nothing() {
     page.act(&identify_for_long());
     page.says(60, "#work-now", "best");
     page.until(60, "document.querySelector('#curve canvas') !== null");
-    // What it has found so far is seen over the records, and changes.
+    // The best model so far is drawn over the records, and changes during the search.
     let drawn = "hostFit.groups[0].charts.filter(c => c.best).length === 4 && document.querySelector('.switches').textContent.includes('best so far')";
     page.until(60, drawn);
     page.scroll_to("#records-section");

@@ -40,7 +40,7 @@ fn run(arguments: &[&dyn AsRef<std::ffi::OsStr>]) {
     );
 }
 
-/// Half of the records of the bundled ramp with a hidden effect, which says as much in a fifth of the time.
+/// Half of the records of the bundled ramp with a hidden effect: the same answers in a fifth of the time.
 fn ramp(folder: &Path) -> PathBuf {
     let bundled = root().join("data/hidden-ramp");
     let data = folder.join("ramp");

@@ -31,7 +31,7 @@ fn segments(pdf: &[u8]) -> usize {
     count
 }
 
-/// Prints a page of `records` records, and sees that nothing of it is lost.
+/// Prints a page of `records` records, and checks that nothing is lost.
 #[track_caller]
 pub(crate) fn keeps_its_curves(b: &Window, address: &str, records: usize) {
     // Printed from a dark screen: the paper is white nevertheless.

@@ -191,8 +191,7 @@ impl Tab<'_> {
         assert!(wide.as_f64() <= Some(width), "{wide} px wide on {width} px");
     }
 
-    /// Words in pictures are at least 11 px high as they are seen, and nothing of them is cut off at the picture's
-    /// edge.
+    /// Text in pictures is at least 11 px high on the screen, and is not cut off at the picture's edge.
     #[track_caller]
     pub(crate) fn readable(&self) {
         let wrong = self.act(

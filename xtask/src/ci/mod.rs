@@ -236,7 +236,7 @@ fn ci(arguments: &[String]) -> Result<()> {
 mod tests {
     use super::*;
 
-    /// Otherwise CI would wait for ever.
+    /// A step that waits for a step below it would never start.
     #[test]
     fn steps_come_after_steps_above_them() {
         for (at, step) in STEPS.iter().enumerate() {

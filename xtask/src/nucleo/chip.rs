@@ -162,7 +162,7 @@ impl Chip {
         self.clocked(address, "written");
         self.written.push(Written { address, value });
         match address {
-            // Writing zero clears, one keeps (RM0390, 13.13.1).
+            // Writing 0 clears a flag, writing 1 keeps it (RM0390, 13.13.1).
             ADC_SR => self.change(ADC_SR, |status| status & value),
             // Bits 24 to 31: reason of the last restart; RMVF clears it.
             RCC_CSR if value & 1 << 24 != 0 => self.set(RCC_CSR, value & 0xFF_FFFF),

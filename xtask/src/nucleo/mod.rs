@@ -211,8 +211,8 @@ impl Board {
         }
     }
 
-    /// The core is about to access the word at `address`: stores the value that it writes, or puts the value that
-    /// it reads into its register.
+    /// Serves the core's access to the word at `address`: stores a written value, or puts the read value into the
+    /// core's register.
     fn serve(&mut self, address: u32) -> Result<()> {
         let at = self.debugger.register(15)? & !1;
         let bytes = self.debugger.memory(at, 4)?;

@@ -245,7 +245,7 @@ fn component(package: &Package, kind: &str, checksum: Option<&str>) -> Result<Va
     let license = license
         .as_ref()
         .with_context(|| format!("{name} states no licence"))?;
-    // An old way to write it.
+    // Old notation of a licence expression.
     let license = license.replace('/', " OR ").replace("  ", " ");
     let mut component = json!({
         "type": kind,

@@ -161,7 +161,7 @@ pub(super) fn wheel(made: &Made) -> Result<()> {
     // NumPy is the system's and is not downloaded.
     run(command(python, &["-m", "venv", "--system-site-packages"]).arg(&environment))?;
     std::fs::create_dir_all(folder.join("out/demo"))?;
-    // Instead of the demo's model, which takes a minute.
+    // In place of the demo's model, which would take a minute to identify.
     std::fs::copy(
         root().join("data/paper/table-2-state-dependent.toml"),
         folder.join("out/demo/hidden-after.toml"),

@@ -42,7 +42,7 @@ pub(super) mod bench {
     use super::Part;
     use crate::plant::jet::bench::{jet, run};
 
-    /// The jet's strength at times `at` when the coil is switched at the times `on`, alternating.
+    /// The jet's strength at the times `at`; the coil is switched on and off in turn at the times `on`.
     pub(in super::super) fn strengths(part: Part, switching: &[f64], at: &[f64]) -> Vec<f64> {
         let mut jet = jet([part]);
         let mut switching = switching.iter().copied().peekable();

@@ -149,7 +149,7 @@ impl<E: Copy> Card<E> {
 /// Commands with which an effect is visible.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ShowsWith {
-    /// Off and on are enough.
+    /// The levels off and on are sufficient.
     OnOff,
     /// Levels between off and on.
     Levels,
@@ -161,7 +161,7 @@ pub enum ShowsWith {
 pub(crate) trait Physics: Copy + Debug + PartialEq + Sized + 'static {
     /// Name in model files and reports.
     const NAME: &'static str;
-    /// The effect of the catalogue that it is or that it resembles.
+    /// Name of the effect in the catalogue, or of the most similar effect of the catalogue.
     const RESEMBLES: &'static str = Self::NAME;
     /// Place of the effect.
     const PLACE: Place;
@@ -407,7 +407,7 @@ macro_rules! catalogue {
                 match self { $(Self::$effect(effect) => validate(effect),)+ }
             }
 
-            /// The effect of the catalogue that it is or that it resembles.
+            /// Name of the effect in the catalogue, or of the most similar effect of the catalogue.
             pub fn resembles(&self) -> &'static str {
                 match self { $(Self::$effect(_) => $effect::RESEMBLES,)+ }
             }

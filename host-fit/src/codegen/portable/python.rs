@@ -177,7 +177,7 @@ fn tuple(values: impl Iterator<Item = String>) -> String {
     format!("({}{end})", values.join(", "))
 }
 
-/// What a sum over the past adds.
+/// A sum over past values, as a Python expression.
 fn sum(coefficients: &[f64], back: &[usize]) -> String {
     let mut text = String::new();
     for (i, (coefficient, lag)) in coefficients.iter().zip(back).enumerate() {

@@ -184,7 +184,8 @@ fn weighed_words(weighed: &Weighed, is_steady: bool) -> String {
         && is_steady
     {
         text.push_str(&format!(
-            "\nsteady blowing is best: pulses lose more friction than the saved air is worth; pulses are better from --air-price {price:.3} on"
+            "\nsteady blowing is best: pulses lose more friction than the saved air is worth. With --air-price \
+                {price:.3} or more, pulses are better"
         ));
     }
     text

@@ -34,12 +34,12 @@ const CURVES: &[Known] = &[
         &[("jet", &["memory of u", "blowing in the last"])],
     ),
     ("free-stream-variation", &[("jet", &["u_inf"])]),
-    // It acts during the jet only, where both coordinates are equal.
+    // The starting vortex acts during the jet only, where both coordinates are equal.
     (
         "starting-vortex",
         &[("jet", &["since rising edge", "pulse length"])],
     ),
-    // It acts after the jet has ended: the place is the flow.
+    // The stopping vortex acts after the jet has ended: the place is the flow.
     ("stopping-vortex", &[("flow", &["since falling edge"])]),
     ("amplitude-saturation", &[("flow", &["y"])]),
     ("hot-film-nonlinearity", &[("sensor", &["reading", "y"])]),

@@ -10,20 +10,20 @@ use crate::campaign::program::Spent;
 /// A reported term.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Told {
-    /// Its place and coordinate.
+    /// Place and coordinate of the term.
     #[serde(flatten)]
     pub spot: Spot,
-    /// Its equivalence set.
+    /// Equivalence set of the term, without the term itself.
     pub alike: Vec<Spot>,
-    /// Share of the unexplained variance that its curve explains, %.
+    /// Share of the unexplained variance that the term explains, %.
     pub excess_taken_percent: f64,
     /// p-value.
     pub p_value: f64,
     /// Similar effects of the catalogue.
     pub resembles: Vec<String>,
-    /// Its formula.
+    /// Formula of the term.
     pub formula: String,
-    /// Its curve: (coordinate, value).
+    /// Points of the curve: (coordinate, value).
     #[serde(default)]
     pub curve: Vec<(f64, f64)>,
 }
@@ -39,7 +39,7 @@ impl Told {
 pub struct Row {
     /// Key of the case.
     pub key: String,
-    /// Its group; none before it was run.
+    /// Group of the case; none before it was run.
     pub group: Option<Group>,
     /// Name of the family.
     pub family: String,

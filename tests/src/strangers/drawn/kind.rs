@@ -348,7 +348,7 @@ fn measured_input(rng: &mut ChaCha8Rng) -> Drawn {
         "; fan: gain {:.4}, lag {:.1} samples, dead time {} samples",
         second.gain, second.lags[0], second.dead_time
     );
-    // Otherwise the response to an edge of the command often coincides with one to the fan.
+    // No dead time is expected, because the response to an edge of the command often coincides with one to the fan.
     (drawn.dead_time, drawn.input) = (None, Some("fan"));
     drawn
 }

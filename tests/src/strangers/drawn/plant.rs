@@ -7,7 +7,7 @@ use rand_chacha::ChaCha8Rng;
 /// Steps per sample.
 const STEPS: usize = 10;
 
-/// What follows the lags in series.
+/// Dynamics after the lags in series.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Last {
     Nothing,
@@ -37,7 +37,7 @@ pub(super) struct Plant {
 struct Running<'a> {
     plant: &'a Plant,
     states: Vec<f64>,
-    /// x and ẋ of what follows the lags.
+    /// x and ẋ of the dynamics after the lags.
     last: [f64; 2],
     /// Commands of the steps within the dead time, oldest first.
     under_way: std::collections::VecDeque<f64>,

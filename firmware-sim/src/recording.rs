@@ -39,7 +39,7 @@ pub enum RigError {
     Exclusive(&'static str, &'static str),
 }
 
-/// The units of the recording: the same samples with other numbers.
+/// The units in which the samples of a recording are written.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Units {
     /// Factor from the rig's times to recorded times.

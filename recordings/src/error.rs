@@ -150,7 +150,7 @@ pub enum DataProblem {
     /// A problem of a file to import.
     #[error(transparent)]
     Import(#[from] ImportProblem),
-    /// The operating system refused to open or read it.
+    /// The operating system refused to open or read the file.
     #[error("cannot be read ({0}); check the path and its permissions")]
     Unreadable(std::io::Error),
     /// A folder without `dataset.toml`.

@@ -98,7 +98,7 @@ impl fmt::Display for Value {
 pub struct Rulebook {
     /// The module of `host-fit`, or a crate.
     pub room: &'static str,
-    /// The subject of its rules.
+    /// The subject of the group's rules.
     pub about: String,
     /// The rules.
     pub rules: Vec<Rule>,

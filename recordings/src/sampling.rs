@@ -21,7 +21,7 @@ pub(crate) struct TimeFault {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Stated {
     pub(crate) period_s: f64,
-    /// Its source: subject and verb of a sentence, ``"`sample_period_s` is"``.
+    /// Source of the period, as subject and verb of a sentence: ``"`sample_period_s` is"``.
     pub(crate) by: &'static str,
 }
 
@@ -45,7 +45,7 @@ pub(crate) struct Rounded {
     pub(crate) longest: f64,
     /// Number of steps that differ from the most common one by more than the tolerance.
     pub(crate) uncommon: usize,
-    /// The row after the first such step.
+    /// The row after the first uncommon step.
     pub(crate) row: usize,
 }
 

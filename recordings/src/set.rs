@@ -49,7 +49,7 @@ pub enum Plant {
 }
 
 impl Plant {
-    /// Whether it is the default, which is not written to files.
+    /// Whether the plant is the default, which is not written to files.
     #[must_use]
     pub fn is_flow(&self) -> bool {
         *self == Self::Flow

@@ -83,7 +83,7 @@ impl std::fmt::Display for Change {
 pub struct Streamed {
     /// Sample numbers with the samples.
     pub samples: Vec<(u32, Sample)>,
-    /// Number of the sample after them.
+    /// Number of the sample after this batch.
     pub next: u32,
     /// Phase of the board.
     pub phase: Phase,

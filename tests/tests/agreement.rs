@@ -10,7 +10,7 @@ use scenarios::agreement::{Case, Gradings, Tool, cases, run};
 #[test]
 fn exported_models_say_what_the_host_says() {
     let all = cases(Gradings::InTurn);
-    // The others: `cargo xtask agreement`.
+    // The other cases run in `cargo xtask agreement`.
     let some: Vec<Case> = all
         .into_iter()
         .filter(|case| ["effects", "own: every function"].contains(&case.name.as_str()))

@@ -116,15 +116,15 @@ fn the_five_second_delay_stands_for_switching_off() {
     for (found, expected) in after(5_000).into_iter().zip([0.375, 0.158, 0.024]) {
         near(found, expected, 2e-3);
     }
-    // On for 3 s: it does not separate for two seconds.
+    // On for 3 s: the flow does not separate for two seconds.
     for (found, expected) in after(3_000).into_iter().zip([0.98, 0.92, 0.79]) {
         near(found, expected, 2e-2);
     }
-    // On for 8 s: it collapses while still blowing.
+    // On for 8 s: the flow separates while the jets still blow.
     let y = run(&averaged, &vec![1.0; 8_000]).expect("bounded");
     near(y[4_900], 1.010, 5e-3);
     near(y[7_999], 0.26, 1e-2);
-    // Without it, the flow stays attached for seconds after the jets are off.
+    // Without the second input, the flow stays attached for seconds after the jets are off.
     let mut without = averaged;
     without.c[2] = 0.0;
     without.c[3] = 0.0;

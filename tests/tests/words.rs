@@ -154,7 +154,7 @@ fn banned_phrases_are_in_no_message() {
     assert!(files.len() > 200, "{}", files.len());
     let mut found = Vec::new();
     for file in &files {
-        // Rules describe internal decisions; their page is for whoever changes one.
+        // Rules describe internal decisions; their page is for readers who change a rule.
         if file.ends_with("rules.rs") {
             continue;
         }

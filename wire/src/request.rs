@@ -23,14 +23,14 @@ pub enum Ask<'a> {
     Alive,
     /// Run lengths of a command, to be stored from index `at` on.
     Load {
-        /// Index of the first of them; 0 begins a new command.
+        /// Index of the first run; 0 begins a new command.
         at: u16,
         /// The run lengths, samples.
         runs: Runs<'a>,
     },
     /// Play the command that was loaded.
     Play {
-        /// How often.
+        /// Number of repeats.
         repeats: u32,
         /// Number of runs of the command.
         runs: u16,
@@ -43,7 +43,7 @@ pub enum Ask<'a> {
     Arm,
     /// Close the valve, end the command being played, acknowledge a fault.
     Disarm,
-    /// The settings of the law with their bounds? Answered with [`Settings`](crate::reply::Settings).
+    /// Ask for the settings of the law and their bounds. The answer is [`Settings`](crate::reply::Settings).
     Settings,
     /// Change the target of the running law, y of the flow.
     Target(f32),

@@ -53,7 +53,7 @@ pub struct Batch {
     /// Number of the next sample.
     next: u32,
     count: usize,
-    /// A bit for each sample.
+    /// One bit per sample: whether the valve was open.
     open: u32,
     /// Samples that did not fit since the session began, wrapping.
     left_out: u32,
@@ -185,17 +185,17 @@ fn steps(counts: f32) -> i16 {
 /// A frame of samples as the host reads it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Samples<'a> {
-    /// Whose stream it is.
+    /// Session of the host that requested the stream.
     pub session: u32,
-    /// Number of its first sample, from the stream's beginning.
+    /// Number of the first sample, from the stream's beginning.
     pub first: u32,
     /// State of the board at this sample.
     pub phase: Phase,
     /// y* at its first sample; `None` without a law, or with one that has none.
     pub reference: Option<f32>,
-    /// Whether the stream ends with it.
+    /// Whether the stream ends with this frame.
     pub last: bool,
-    /// Samples before it that did not fit on the board, wrapping.
+    /// Number of samples before this frame that did not fit on the board, wrapping.
     pub left_out: u32,
     open: u32,
     law: bool,
@@ -242,7 +242,7 @@ impl<'a> Samples<'a> {
         self.bytes.len() / self.each()
     }
 
-    /// Whether there is none in it.
+    /// Whether the frame contains no sample.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.bytes.is_empty()

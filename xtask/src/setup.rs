@@ -28,11 +28,11 @@ const DEBIAN_RUSTC: &str = "/usr/bin/rustc";
 /// Source of `core` for the targets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Core {
-    /// The toolchain in use contains it.
+    /// The toolchain in use contains the compiled `core`.
     Prebuilt,
-    /// The toolchain in use contains its source.
+    /// The toolchain in use contains the source of `core`.
     FromSource,
-    /// Debian's compiler has its source.
+    /// Debian's compiler comes with the source of `core`.
     FromDebianSource,
 }
 

@@ -57,8 +57,8 @@ pub(crate) fn same_period(rig: &RigFile, model: &Model) -> Result<(), String> {
         return Ok(());
     }
     Err(format!(
-        "`sample_period_s`: the rig was measured at {} s and the model is for {} s; calibrate with the board at the \
-         model's period, or identify at the rig's",
+        "`sample_period_s`: the rig was measured at {} s and the model is for {} s; calibrate with the board at \
+            the model's period, or identify a model at the rig's period",
         rig.sample_period_s, model.sample_period_s
     ))
 }
@@ -102,8 +102,8 @@ pub(crate) fn fits(rig: &RigFile, model: &Model) -> Result<(), String> {
         && (hold.on < on || hold.off < off)
     {
         return Err(format!(
-            "`valve` and `law.hold`: the valve's shortest times are {on} samples open and {off} shut, and the law takes {} and \
-             {}; design with --min-on {} --min-off {}",
+            "`valve` and `law.hold`: the valve's shortest times are {on} samples open and {off} shut, but the law \
+                assumes {} and {}; design with --min-on {} --min-off {}",
             hold.on, hold.off, rig.valve.shortest_on_s, rig.valve.shortest_off_s
         ));
     }

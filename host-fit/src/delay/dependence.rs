@@ -225,8 +225,8 @@ pub(super) fn words(
                 Some(reason) if tests.law.is_some_and(|p| p < RULES.significant) =>
                     reason.to_owned(),
                 _ => format!(
-                    "over the range of the averaged output the delay changes by {:.1} samples (p {}), not \
-                    significant, or below one sample",
+                    "the delay changes by {:.1} samples over the range of the averaged output (p {}), which is not \
+                        significant or less than one sample",
                     tests.change.abs(),
                     p(tests.law)
                 ),
@@ -249,7 +249,8 @@ pub(super) fn words(
             p(tests.law_within)
         ),
         DelayVerdict::StateDependent => format!(
-            "The law is supported: the delay changes by {:.1} samples over the range of the averaged output (p {}), and rising and falling edges follow the same law.",
+            "The law is supported: the delay changes by {:.1} samples over the range of the averaged output (p \
+                {}), and rising and falling edges follow the same law.",
             tests.change.abs(),
             p(tests.law)
         ),

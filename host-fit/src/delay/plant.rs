@@ -28,7 +28,7 @@ pub(crate) struct Change {
     pub(crate) time: f64,
     /// The new command minus that before the record.
     pub(crate) level: f64,
-    /// Whether it rose.
+    /// Whether the command rose.
     pub(crate) rising: bool,
     /// Whether the new command is in the upper half of the range.
     pub(crate) on: bool,

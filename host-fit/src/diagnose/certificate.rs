@@ -23,7 +23,7 @@ pub struct Certificate {
     /// Level α, 0 to 1. The effect is certified if the log e-value is at least ln(1/α). At most a share α of
     /// certificates is false, provided that the noise model is right and the base class contains the true base.
     pub alpha: f64,
-    /// Names of the records from which it was computed.
+    /// Names of the records from which the certificate was computed.
     pub records: Vec<String>,
     /// Of the variance that the best model without the effect leaves unexplained: the share that the model with the
     /// effect explains. At most 1; negative if the model with the effect leaves more variance unexplained.

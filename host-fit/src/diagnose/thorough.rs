@@ -8,7 +8,7 @@ use crate::terms::{Effort, Found, Hypothesis, Search};
 pub(crate) struct Given<'a, E> {
     /// The model, in inner units.
     pub(crate) model: &'a Model,
-    /// Its root mean square error on the validation records.
+    /// Root mean square error of the model on the validation records.
     pub(crate) rmse: f64,
     /// Whether the lags of the model are kept, so that the search starts from its structure.
     pub(crate) keeps_lags: bool,

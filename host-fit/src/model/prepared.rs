@@ -82,7 +82,7 @@ pub enum Rounding {
 pub enum AnyDelay<T: Real> {
     /// Constant whole samples.
     Fixed(FixedDelay<Vec<u16>>),
-    /// After a law of the catalogue.
+    /// Delays by a law of the catalogue.
     Law {
         /// The law.
         law: AnyTransport<T>,

@@ -45,7 +45,7 @@ impl Progress for () {
 pub struct Success {
     /// The better point.
     pub point: Point,
-    /// Value of the objective there.
+    /// Value of the objective at the better point.
     pub value: f64,
 }
 

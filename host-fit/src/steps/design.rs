@@ -307,9 +307,9 @@ pub fn law_margin(design: &Design, seed: u64, planes: bool) -> Option<Margin> {
 pub struct TargetVerdict {
     /// The target, in the sensor's units.
     pub target: f64,
-    /// Whether it passes.
+    /// Whether the law passes all deciding trials.
     pub passes: bool,
-    /// Why it fails: the trials that lose attachment, or the error of the design.
+    /// Reason of a failure: the trials that lose attachment, or the error of the design.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reason: Option<String>,
 }

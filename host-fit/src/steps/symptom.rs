@@ -86,14 +86,14 @@ const SYMPTOMS: [Symptom; 23] = [
             "a longer memory of the flow, `starting-vortex`: random on-times distinguish them.",
         ),
     of("starting-vortex")
-        .shown("an additional response after each rising edge that decays")
+        .shown("an additional, decaying response after each rising edge")
         .check("take phase-locked images 10 to 50 ms after a rising edge")
         .confused(
             "`plenum-droop` with a short recovery: single pulses after long rests distinguish \
              them.",
         ),
     of("stopping-vortex")
-        .shown("an undershoot after each falling edge that decays")
+        .shown("a decaying undershoot after each falling edge")
         .check("take phase-locked images 10 to 50 ms after a falling edge")
         .confused("`edge-dependent-delay`: pulses of several lengths distinguish them."),
     of("state-dependent-delay")

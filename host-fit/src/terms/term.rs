@@ -26,7 +26,7 @@ pub enum Term {
     Path {
         /// Card of the term.
         spec: &'static Spec,
-        /// Starting values of its parameters.
+        /// Starting values of the parameters.
         parameters: Vec<f64>,
     },
     /// The offset of the sensor; part of the base, no missing effect.
@@ -35,11 +35,11 @@ pub enum Term {
     Effect {
         /// Card of the term.
         spec: &'static Spec,
-        /// Starting values of its parameters.
+        /// Starting values of the parameters.
         parameters: Vec<f64>,
         /// The response of the flow to jets of part strength, if the effect causes them.
         grading: Grading,
-        /// Reference value of its channel.
+        /// Reference value of the effect's channel.
         reference: Option<f64>,
     },
 }

@@ -49,7 +49,7 @@ struct TableLine<T> {
     from: T,
     steepness: T,
     rise: T,
-    /// The value at its start.
+    /// The value at the start of the line.
     below: T,
 }
 

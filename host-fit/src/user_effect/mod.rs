@@ -174,7 +174,7 @@ impl Definition {
         self.source.scales
     }
 
-    /// Whether it is a measured input.
+    /// Whether the effect is a measured input.
     pub(crate) fn is_measured_input(&self) -> bool {
         self.scales() && self.spec.channel.is_some()
     }

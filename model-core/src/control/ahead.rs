@@ -65,7 +65,7 @@ impl<T: Real> Foreknown<T> {
         }
     }
 
-    /// Fills the cache at the first sample; returns whether this was it.
+    /// Fills the cache at the first sample; returns whether this is the first sample.
     pub(crate) fn begin(&mut self, recursion: &Bilinear<'_, T>, outputs: &impl Past<T>) -> bool {
         let begins = !self.complete;
         if begins {

@@ -181,7 +181,7 @@ mod tests {
         };
         let quiet = learnt(&law, 3000, 0.0);
         assert_eq!(quiet.bias, 0.0);
-        // Riccati: it decreases to the final rate and not further.
+        // The rate decreases to the final rate of the Riccati equation and not further.
         assert!((quiet.share - 0.2).abs() < 0.005, "{}", quiet.share);
         // A changed model error moves the bias beyond its dead band, and resets the integral rate.
         let mut wrong = quiet;

@@ -27,7 +27,7 @@ impl HoldTimes {
     }
 }
 
-/// Valve position and time in it.
+/// Valve position, and time since the valve moved there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Hold {
     on: bool,
@@ -52,7 +52,7 @@ impl Hold {
         self.on
     }
 
-    /// Time in its position, samples; saturates at `u32::MAX`.
+    /// Time in the present position, samples; saturates at `u32::MAX`.
     #[inline]
     #[must_use]
     pub const fn since(&self) -> u32 {

@@ -110,7 +110,7 @@ impl Parameter {
         }
     }
 
-    /// Whether it spans orders of magnitude and is searched in its logarithm.
+    /// Whether the parameter spans orders of magnitude and is searched in its logarithm.
     #[must_use]
     pub fn is_logarithmic(&self) -> bool {
         self.low > 0.0 && self.high > 20.0 * self.low
@@ -342,13 +342,13 @@ pub struct Spec {
     pub summary: &'static str,
     /// The continuous-time equation.
     pub equation: &'static str,
-    /// Its parameters, in the order of [`Physics::new`](super::Physics::new).
+    /// Parameters of the effect, in the order of [`Physics::new`](super::Physics::new).
     pub parameters: &'static [Parameter],
     /// Starting points of a search over the parameters.
     pub starts: Starts,
     /// Amplitude parameter of the effect, if it has one.
     pub amplitude: Option<Amplitude>,
-    /// The measured channel it needs in addition to u and y.
+    /// The measured channel that the effect needs in addition to u and y.
     pub channel: Option<&'static str>,
     /// Whether the effect's reference is the calibration reading of the sensor, y > 0; 1 by default.
     pub calibrated: bool,
@@ -361,7 +361,7 @@ pub struct Spec {
     pub lag_in_series: bool,
     /// Whether it opposes or scales a motion: it is applied after all driving effects.
     pub resists: bool,
-    /// Whether it acts in front of all other effects of its place.
+    /// Whether the effect acts before all other effects of its place.
     pub leads: bool,
     /// Additional card of a delay law.
     pub law: Option<LawCard>,

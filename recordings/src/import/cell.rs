@@ -21,11 +21,11 @@ pub(super) enum Cell<'a> {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Number<'a> {
     pub(super) value: f64,
-    /// One unit in the last printed place.
+    /// Resolution of the number: one unit in its last printed place.
     pub(super) unit_in_last_place: f64,
     /// The unit after the number.
     pub(super) unit: Option<&'a str>,
-    /// Whether it has thousands separators.
+    /// Whether the number has thousands separators.
     pub(super) is_grouped: bool,
 }
 
@@ -128,7 +128,7 @@ impl<'a> Cell<'a> {
         }
     }
 
-    /// Whether it is a valid value of a table.
+    /// Whether the cell is a valid value of a table.
     pub(super) fn is_value(&self) -> bool {
         !matches!(self, Self::Empty | Self::Text)
     }

@@ -40,7 +40,7 @@ use crate::set::{DataSet, unite_periods};
 pub struct From {
     /// The file's name, without its folder.
     pub file: String,
-    /// The mapping of its variables.
+    /// The mapping of the file's variables.
     #[serde(flatten)]
     pub mapping: Mapping,
     /// Units by column, as the file states them.
@@ -68,7 +68,7 @@ pub struct Import {
 /// Summary of one file.
 #[derive(Debug, Clone, Serialize)]
 pub struct ImportedFile {
-    /// Name of its record.
+    /// Name of the file's record.
     pub name: String,
     /// Description of the file's format.
     pub dialect: String,

@@ -73,7 +73,7 @@ pub enum ImportProblem {
              the file there"
     )]
     LongGap {
-        /// From the last value before it to the first after it, s.
+        /// Length of the gap, from the last value before it to the first value after it, s.
         length_s: f64,
         /// The longest gap that is filled, s.
         most_s: f64,

@@ -66,11 +66,11 @@ pub struct Variable {
     /// Values of the variable.
     pub values: Vec<f64>,
     pub(super) exactness: Exactness,
-    /// Rows in which its cell is empty; their values are NaN.
+    /// Rows with an empty cell of this variable; their values are NaN.
     pub(super) blanks: Vec<usize>,
-    /// The dates or clock times of its cells, if they are stamps.
+    /// The dates or clock times of the cells, if they are stamps.
     pub(super) stamped: Option<Stamped>,
-    /// Remarks on the interpretation of its cells.
+    /// Remarks on the interpretation of the cells.
     pub(super) notes: Vec<String>,
 }
 
@@ -78,7 +78,7 @@ pub struct Variable {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Unread {
     pub(super) name: String,
-    /// Line of the first such cell.
+    /// Line of the first unreadable cell.
     pub(super) line: u64,
     /// Contents of that cell.
     pub(super) text: String,

@@ -38,7 +38,7 @@ impl Tool {
         }
     }
 
-    /// Whether it is installed.
+    /// Whether the tool is installed.
     #[must_use]
     pub fn is_installed(self) -> bool {
         let mut command = self.command();

@@ -23,7 +23,7 @@ pub struct Row {
     pub language: &'static str,
     /// The largest difference relative to the largest |y|; 0 for bit equality.
     pub difference: f64,
-    /// Whether it is within the promised tolerance.
+    /// Whether the largest difference is within the promised tolerance.
     pub agrees: bool,
     /// Instructions of a sample, if a board ran it.
     pub instructions: Option<f64>,

@@ -41,7 +41,7 @@ enum Unknown {
     Reversal,
     /// A resonance at 25 Hz that the jets excite.
     Resonance,
-    /// A bubble that fills and reduces the level, the more the fuller it is.
+    /// A bubble that fills slowly; the fuller the bubble, the lower the level.
     Memory,
     /// Reading = full·(friction/full)^[`FILM_EXPONENT`]: King's law with another exponent than the catalogue's.
     Film,

@@ -342,14 +342,14 @@ fn shows(name: &str, family: Family) -> bool {
     on_off(name) || family == Family::FirstOrder
 }
 
-/// Whether the diagnosis states a detectable size for it.
+/// Whether the diagnosis states a detectable size for the effect `name`.
 fn has_amplitude(name: &str) -> bool {
     let card = model_core::effects::spec(name);
     let said = card.is_some_and(|card| card.amplitude.is_some() && card.channel.is_none());
     said && on_off(name)
 }
 
-/// Whether it is visible with on/off commands.
+/// Whether the effect `name` is visible with on/off commands.
 fn on_off(name: &str) -> bool {
     let mut rng = ChaCha8Rng::seed_from_u64(0);
     let base = firmware_sim::plant::BasePlant::draw(&mut rng);

@@ -85,7 +85,7 @@ pub struct Row {
     pub failure: Option<String>,
     /// The named effects in their order, and those certified although another error remains.
     pub missing: Vec<String>,
-    /// Equivalence set of each of them.
+    /// Equivalence set of each named effect.
     #[serde(default)]
     pub sets: Vec<Vec<String>>,
     /// Surrogates.

@@ -23,7 +23,7 @@ pub struct Target {
     pub name: &'static str,
     /// Seeds of the mutation.
     pub seeds: fn() -> Vec<Vec<u8>>,
-    /// Words of its language.
+    /// Words of the input's language.
     pub words: &'static [&'static str],
     /// Reads an input and describes it or its error. Panics if a property does not hold.
     pub run: fn(&[u8]) -> String,
@@ -264,7 +264,7 @@ fn dataset(input: &[u8]) -> String {
             survives(&set);
             format!("{} records", set.records.len())
         }
-        // Names in it come from the input.
+        // Names in the message come from the input.
         Err(error) => fault(error, "").replace(|c: char| !c.is_ascii(), ""),
     }
 }

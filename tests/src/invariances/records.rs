@@ -64,7 +64,7 @@ impl fmt::Display for Rig {
     }
 }
 
-/// About normal: twelve uniform numbers.
+/// An approximately normal number: a sum of twelve uniform numbers.
 pub(super) fn normal(random: &mut ChaCha8Rng) -> f64 {
     (0..12).map(|_| random.random::<f64>()).sum::<f64>() - 6.0
 }

@@ -137,7 +137,7 @@ fn finding(answer: &Answer) -> String {
 }
 
 fn write(records: &[Part], folder: &Path) -> Result<(), String> {
-    // The folder of the case before.
+    // The folder of the preceding case.
     let _ = std::fs::remove_dir_all(folder);
     let records = records.iter().map(|part| {
         let role = if part.held_out {

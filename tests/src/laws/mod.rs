@@ -24,11 +24,11 @@ use serde::{Deserialize, Serialize};
 pub struct Asked {
     /// The target, as a share of the reachable interval.
     pub share: f64,
-    /// Why it is rejected; `None` if accepted.
+    /// Reason for rejecting the law; `None` if accepted.
     pub refused: Option<String>,
     /// Whether the law keeps attachment on the true plant; `None` without a law.
     pub works: Option<bool>,
-    /// Rms error there relative to that on the model.
+    /// Rms error on the true plant relative to that on the model.
     pub rms_ratio: Option<f64>,
 }
 

@@ -29,7 +29,7 @@ macro_rules! bundled {
 /// A model on the board.
 #[derive(Clone, Debug)]
 pub struct Case {
-    /// Name of its module on the board.
+    /// Name of the module on the board.
     pub name: String,
     /// The model with its law.
     pub model: Model,
@@ -91,7 +91,7 @@ pub fn all() -> Result<Vec<Case>> {
         let name = format!("effect_{}", spec.name.replace('-', "_"));
         cases.push(Case::new(&name, with_effect(&base, spec)).short());
     }
-    // In the order of the board.
+    // Sorted as on the board.
     cases.sort_by(|a, b| a.name.cmp(&b.name));
     Ok(cases)
 }
@@ -113,7 +113,7 @@ pub fn at(periods_s: &[f64]) -> Result<Vec<Case>> {
             cases.push(Case::new(&format!("{name}_{us}us"), model).short());
         }
     }
-    // In the order of the board.
+    // Sorted as on the board.
     cases.sort_by(|a, b| a.name.cmp(&b.name));
     Ok(cases)
 }
@@ -179,7 +179,7 @@ fn with_effect(base: &Model, spec: &'static Spec) -> Model {
         .iter()
         .map(|parameter| {
             let start = parameter.starts.first().copied();
-            // At 0 it would have no effect.
+            // A parameter of 0 would have no influence.
             start.filter(|start| *start != 0.0).unwrap_or(0.05)
         })
         .collect();

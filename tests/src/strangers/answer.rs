@@ -14,11 +14,11 @@ const POLL: Duration = Duration::from_millis(5);
 pub(crate) struct Answer {
     /// The command's name, for messages.
     pub(crate) command: String,
-    /// Exit code; none if it was stopped or ended by a signal.
+    /// Exit code; none if the program was stopped or ended by a signal.
     pub(crate) exit: Option<i32>,
     /// The JSON document; null without one.
     pub(crate) document: Value,
-    /// All its text output.
+    /// All text output of the program.
     pub(crate) said: String,
     /// Wall-clock time, s.
     pub(crate) seconds: f64,

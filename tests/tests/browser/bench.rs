@@ -54,7 +54,7 @@ fn the_workbench_finds_what_is_missing_and_loses_nothing() {
     page.act("document.querySelectorAll('.model')[0].click()");
     page.until(20, &format!("{CURRENT}.startsWith('1.')"));
 
-    // Killed during a step; a new server on the folder has all results.
+    // The server is killed during a step; a new server on the folder has all results.
     page.act(&identify_for_long());
     page.until(20, "!document.getElementById('work').hidden");
     drop(served);
@@ -111,7 +111,7 @@ fn the_workbench_finds_what_is_missing_and_loses_nothing() {
     page.scroll_to("#records-section");
     page.until(20, "document.querySelectorAll('.record canvas').length > 1");
     page.shoot("workbench-compared.png");
-    // A view is its address.
+    // The address of the page contains the view.
     let address = page.act("location.href");
     let again = b.open(address.as_str().expect("an address"), SIZE);
     again.until(20, "[...document.querySelectorAll('.switches label')].some(l => l.textContent.startsWith('3. '))");
@@ -123,7 +123,7 @@ fn the_workbench_finds_what_is_missing_and_loses_nothing() {
     page.until(20, &format!("{CURRENT}.startsWith('3.')"));
     steps.done("undone, compared, branched");
 
-    // Downloaded constants compile where the board's code does.
+    // Downloaded constants compile without the standard library, as on the board.
     let constants = page.download("#models a", "identified.rs");
     compiles(&constants, &folder.path().join("constants"));
     let report = page.download("#models a", "report.html");

@@ -85,7 +85,7 @@ fn recordings_are_dropped_mapped_and_identified() {
     let served = serve(&project, &[]);
     let page = b.open(&served.address, SIZE);
     page.until(20, "document.querySelectorAll('.record').length === 3 && document.querySelectorAll('.model').length === 1");
-    // Other validation records are another question: the model moves aside.
+    // Other validation records start a new tree; the model moves into another folder.
     page.act("document.querySelector('fieldset.records [value=b]').click(); document.getElementById('choose').click()");
     page.until(20, "document.querySelectorAll('.model').length === 0 && hostFit.groups[0].charts.map(c => c.record.use).join() === 'identify,validate,validate'");
     assert!(project.join("earlier-1/model-1.toml").is_file());

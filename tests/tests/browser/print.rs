@@ -51,7 +51,7 @@ pub(crate) fn keeps_its_curves(b: &Window, address: &str, records: usize) {
     eprintln!("  printed: {with} line segments, {without} without the records");
     // Records with measurement, model and residual, some hundred segments each.
     assert!(with > without + records * 3 * 200, "{with} and {without}");
-    // The screen is as it was.
+    // Printing does not change the screen.
     page.has(5, ".paper", 0);
     page.until(
         5,

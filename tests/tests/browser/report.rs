@@ -48,7 +48,7 @@ fn a_report_is_looked_along() {
     page.until(5, "document.querySelectorAll('.bar.here').length > 2");
     page.shoot("report-lit.png");
 
-    // By keyboard: along, in, out, whole.
+    // The keyboard moves the view, zooms in and out, and shows the whole record.
     page.act("document.querySelectorAll('.record')[6].focus()");
     for key in ["+", "PageDown", "ArrowRight"] {
         page.key(key);

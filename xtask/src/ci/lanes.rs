@@ -26,7 +26,7 @@ pub(super) struct Done {
     pub(super) cpu: Option<f64>,
     /// The reason, for a step that failed.
     pub(super) failure: Option<String>,
-    /// Everything it printed.
+    /// Everything that the step printed.
     pub(super) output: String,
 }
 

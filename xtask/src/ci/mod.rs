@@ -59,7 +59,7 @@ enum Room {
 const BUILD: &str = "build";
 const SET_UP: &str = "set-up";
 
-/// In the order in which they start if none has to wait.
+/// The steps, in the order in which they start if none has to wait.
 const STEPS: &[Step] = &[
     Step::new(BUILD, || {
         run(&mut cargo("test --release --workspace --no-run"))

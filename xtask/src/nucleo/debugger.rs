@@ -15,7 +15,7 @@ const ANSWER: Duration = Duration::from_secs(10);
 pub(super) enum Stop {
     /// Before an access to this watched word.
     Access(u32),
-    /// The debugger asked it to stop.
+    /// The debugger asked the core to stop.
     Asked,
 }
 

@@ -279,7 +279,7 @@ fn watchdog(chip: &Chip) -> Result<String> {
     })?;
     let cycles =
         f64::from(4 << chip.value(IWDG + 0x04)) * (f64::from(chip.value(IWDG + 0x08)) + 1.0);
-    // DS10693: its clock is 17 to 47 kHz.
+    // DS10693: the watchdog's clock is 17 to 47 kHz.
     let [least, most] = [47e3, 17e3].map(|clock| cycles / clock);
     ensure!(
         least > 2.0 * PERIOD && most < 0.1,

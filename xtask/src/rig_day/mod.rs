@@ -50,7 +50,7 @@ const LONG: Form = Form {
     watched: ["90", "30"],
     law: 1.0,
 };
-/// The form on the page.
+/// The amounts for the page docs/rig-day.md.
 const SHORT: Form = Form {
     identify: &["step", "sq4-50", "random-a"],
     validate: &["sq2-30", "random-b"],

@@ -46,7 +46,7 @@ fn track_words(design: &TrackDesign, period_s: f64) -> String {
     let ms = |samples: u32| milliseconds(samples.into(), period_s);
     let mut text = format!(
         "holds {} of the interval ({:.3}, {:.3}); duty {:.3} on the model, u_eq = {:.3}\n\
-         shortest times {} ms open, {} ms closed; looks up to {} ms ahead{}",
+         shortest times {} ms open, {} ms closed; predicts up to {} ms ahead{}",
         design.target,
         design.reachable[0],
         design.reachable[1],

@@ -48,7 +48,7 @@ const fn kind(name: &'static str, what: &'static str, draw: fn(&mut ChaCha8Rng) 
     Kind { name, what, draw }
 }
 
-/// In the order in which they are drawn.
+/// The kinds of sets, in the order in which they are drawn.
 pub(super) const KINDS: &[Kind] = &[
     kind("one-pulse", "one step or one pulse", one_pulse),
     kind("second-order", "two lags in series", |rng| of_lags(rng, 2)),

@@ -33,7 +33,7 @@ pub(super) struct Plant {
     pub(super) before: f64,
 }
 
-/// The state while it runs.
+/// The state of a running plant.
 struct Running<'a> {
     plant: &'a Plant,
     states: Vec<f64>,

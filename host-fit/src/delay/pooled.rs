@@ -151,7 +151,7 @@ pub(crate) fn longest_delay(records: &[&Record]) -> usize {
         .max(1)
 }
 
-/// The fits, with dynamics and then dead times that differ by direction if that is significantly better.
+/// The fits. Dynamics, and then dead times, differ between opening and closing if that is significantly better.
 fn with_directions(series: &[Series], fits: Vec<Refined>, max_delay: f64) -> (Vec<Refined>, Free) {
     let changes = series.iter().flat_map(|s| &s.switching.changes);
     let rising = changes.clone().filter(|c| c.rising).count();

@@ -378,7 +378,7 @@ mod tests {
 
     const DEAD_TIME: u16 = 40;
 
-    /// The model of that flow.
+    /// The model of the flow in closed form.
     fn model() -> Model {
         let [closed, open] = [SEPARATES_S, ATTACHES_S].map(|time_s| (-0.001_f64 / time_s).exp());
         let constant = LEVELS[0] * (1.0 - closed);

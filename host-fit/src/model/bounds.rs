@@ -88,8 +88,7 @@ pub(super) fn delay(delay: &Delay, period_s: f64) -> Result<(), Fault> {
     }
     let key = law.spec.parameters.first().map_or("law", |p| p.name);
     let problem = format!(
-        "with the other parameters and the factors the longest delay is {longest:?} samples; at most {LONGEST} \
-             are allowed"
+        "the parameters and factors of the law give a longest delay of {longest:?} samples; at most {LONGEST} are allowed"
     );
     Err((format!("delay.{key}"), problem))
 }

@@ -416,8 +416,9 @@ impl Model {
         self.order_effects();
     }
 
-    /// Sorts the effects into physical order: by place, terms that lead it first; in the flow, driving before resisting
-    /// ones; otherwise the order of the catalogue, then the user's own effects, and the base terms last.
+    /// Sorts the effects into physical order: by place; within a place, leading terms first; in the flow, driving
+    /// effects before resisting ones; then in the order of the catalogue, of the user's own effects, and of the
+    /// base terms.
     pub(crate) fn order_effects(&mut self) {
         let order: Vec<_> = self.known().collect();
         let rank = |added: &Added| {

@@ -136,7 +136,8 @@ impl Living {
         self
     }
 
-    /// Adds a coordinate of "where it fails": the bin of each sample, per record. In the order of the panels.
+    /// Adds a coordinate of "where it fails": the bin of each sample, per record. Add coordinates in the order of
+    /// the panels.
     pub fn coordinate(&mut self, name: &str, unit: &str, places: &[Stretches]) -> &mut Self {
         let flat = |stretches: &Stretches| {
             let pairs = stretches.iter();

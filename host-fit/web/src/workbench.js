@@ -154,7 +154,7 @@ function drawModel(s) {
     el("h3", {}, "Every record"),
     table(model.columns, model.rows, (i) => i > 1),
     ...(s.models.length > 1 ? [
-      el("h3", {}, "Every model, on the validation records"),
+      el("h3", {}, "Every model, on the same records"),
       table(["model", "FIT, %", "RMSE", "× noise"], s.models.map((m) => [
         `${m.id}. ${m.step}`,
         ...[m.fit_percent, m.rmse, m.rmse && m.noise_rmse && m.rmse / m.noise_rmse].map((v) => (v === null ? "–" : significant(v, 3))),

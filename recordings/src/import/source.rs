@@ -195,7 +195,7 @@ impl Source {
         match (long.as_slice(), shape) {
             ([], _) => push(name.to_owned(), vec![at(0, 0)]),
             ([n], _) => {
-                // Length in either direction, read along it.
+                // The array is read along its only long direction.
                 let along_rows = shape.first() == Some(n) || shape.len() == 1;
                 let value = |k| if along_rows { at(k, 0) } else { at(0, k) };
                 push(name.to_owned(), (0..*n).map(value).collect());

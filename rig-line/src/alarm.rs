@@ -271,7 +271,7 @@ mod tests {
             let mut rng = ChaCha8Rng::seed_from_u64(1000 + seed);
             let mut alarm = Alarm::new(test, 1.0);
             for k in 0..20_000 {
-                // A new operating point once in a while.
+                // A new operating point every 5000 blocks.
                 if k % 5000 == 0 {
                     alarm.learn_again();
                 }

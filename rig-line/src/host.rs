@@ -482,7 +482,7 @@ fn check(info: &Info) -> Result<(), LineError> {
         return wrong(format!("rails of {:?} counts", info.rails));
     }
     if !info.envelope.is_finite() {
-        return wrong(format!("a residual's envelope of {}", info.envelope));
+        return wrong(format!("a residual limit of {}", info.envelope));
     }
     Ok(())
 }

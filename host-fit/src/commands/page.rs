@@ -648,7 +648,7 @@ fn candidates_caption(diagnosis: &Diagnosis) -> String {
     );
     format!(
         "Each effect alone is added to the same base model and refitted together with all other parameters. The grey line \
-         is the base model without the candidate. Both are the {error} of {runs}."
+         is the base model without the candidate. Both are {error}s of {runs}."
     )
 }
 

@@ -15,7 +15,7 @@ pub(super) struct Train {
 }
 
 impl Train {
-    /// The valve open throughout.
+    /// Steady blowing: the valve is always open.
     pub(super) fn steady() -> Self {
         Self {
             period: 1,

@@ -11,7 +11,7 @@ rules! {
     /// A coordinate with fewer distinct points than this is not screened.
     fewest_points: usize = 3, "", "judgement: a curve needs more than the two points of a line";
     /// Points inserted in one round where a curve is steepest, if they lower the error enough.
-    inserted: usize = 3, "", "judgement: the position of a step becomes known four times more closely";
+    inserted: usize = 3, "", "judgement: three points locate a step four times more closely";
     /// Rounds of inserting points.
     refinements: usize = 2, "rounds", "judgement";
     /// Most points of a curve after insertion.

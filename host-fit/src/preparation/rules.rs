@@ -12,7 +12,7 @@ rules! {
     /// Shortest time constant of the first-order reference.
     shortest_time: f64 = 0.5, "samples", "faster responses are not distinguishable from an immediate one";
     /// Rounds in which dead time and time constant of the first-order reference are refined.
-    refinements: usize = 7, "", "halving: to a hundredth of the first step";
+    refinements: usize = 7, "", "seven halvings, to a hundredth of the first step";
     /// If the reference explains less than this share, y counts as independent of u.
     related: f64 = 0.2, "share of the variance", "judgement";
 

@@ -621,7 +621,7 @@ mod tests {
                     envelope: f32::INFINITY,
                     ..good
                 },
-                "envelope",
+                "residual limit",
             ),
         ] {
             let error = check(&bad).expect_err(word).to_string();

@@ -8,7 +8,7 @@ use crate::model::Model;
 use crate::parallel;
 use crate::terms::{Found, Hypothesis, MostLikely, Term, log_e, p_of};
 use serde::Serialize;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::PoisonError;
 
 /// The certificate of an effect: a bound on its false-alarm rate, valid even if other effects are missing (theory
@@ -26,7 +26,8 @@ pub struct Certificate {
     /// Names of the records from which the certificate was computed.
     pub records: Vec<String>,
     /// Of the variance that the best model without the effect leaves unexplained: the share that the model with the
-    /// effect explains. At most 1; negative if the model with the effect leaves more variance unexplained.
+    /// effect explains. At most 1; negative if the model with the effect leaves more variance unexplained. Models that
+    /// imitate the effect with more parameters and less evidence do not count.
     #[serde(skip)]
     pub share: f64,
 }
@@ -70,30 +71,13 @@ impl Session<'_> {
         if effects.is_empty() {
             return None;
         }
-        let (terms_fewer, nats) = self.leaner_than_given(last)?;
-        Some(Parsimony {
+        let terms_fewer = count(self.given).checked_sub(count(last.judged.model()))?;
+        let nats = self.evidence_of(last.judged.model())? - self.evidence_of(self.given)?;
+        (terms_fewer > 0 && nats > 0.0).then(|| Parsimony {
             effects: effects.to_vec(),
             nats,
             terms_fewer,
         })
-    }
-
-    /// Number of parameters that `model` has fewer than the given model, and nats of evidence that it has more. `None`
-    /// if one of the two numbers is not positive.
-    fn leaner_than_given(&self, model: &Hypothesis) -> Option<(usize, f64)> {
-        let count = |model: &Model| model.coordinates().len();
-        let fewer = count(self.given).checked_sub(count(model.judged.model()))?;
-        if fewer == 0 {
-            return None;
-        }
-        let nats = self.evidence_of(model.judged.model())? - self.evidence_of(self.given)?;
-        (nats > 0.0).then_some((fewer, nats))
-    }
-
-    /// Whether the given model imitates the effects of `model` with more parameters and less evidence. Its error is then
-    /// no measure of what the effects explain.
-    pub(super) fn given_imitates(&self, model: &Hypothesis) -> bool {
-        self.leaner_than_given(model).is_some()
     }
 
     /// ln of the evidence of a model at its most likely parameters, nats; `None` if its free run diverges. Several
@@ -123,9 +107,20 @@ impl Session<'_> {
         let effects = subject.terms.iter().filter_map(Term::effect);
         let names: Vec<&str> = effects.map(|effect| effect.name).collect();
         let nulls: Vec<Null> = std::iter::once(self.null(without)?)
-            .chain(self.given_without(subject, &names))
+            .chain(self.given_without(&names))
             .collect();
-        self.certificate(subject, &nulls, found)
+        let own = self.evidence_of(subject.judged.model())?;
+        self.certificate(subject, own, &nulls, found)
+    }
+
+    /// Whether the given model imitates the effects of `model`: it has none of them, more parameters and less evidence.
+    pub(super) fn given_imitates(&self, model: &Hypothesis) -> bool {
+        let names = model.terms.iter().filter_map(Term::effect);
+        let names: Vec<&str> = names.map(|effect| effect.name).collect();
+        let null = self.given_without(&names);
+        let own = self.evidence_of(model.judged.model());
+        null.zip(own)
+            .is_some_and(|(null, own)| null.imitates(model, own))
     }
 
     /// The certificate of `subject` against `without` alone.
@@ -135,21 +130,19 @@ impl Session<'_> {
         without: &Hypothesis,
         found: &Found,
     ) -> Option<Certificate> {
-        self.certificate(subject, &[self.null(without)?], found)
+        let own = self.evidence_of(subject.judged.model())?;
+        self.certificate(subject, own, &[self.null(without)?], found)
     }
 
-    /// The given model as a null model for `subject`, unless it has one of these effects or diverges.
-    fn given_without(&self, subject: &Hypothesis, effects: &[&str]) -> Option<Null> {
+    /// The given model as a null model, unless it has one of these effects or diverges.
+    fn given_without(&self, effects: &[&str]) -> Option<Null> {
         if effects.iter().any(|name| self.given.has_effect(name)) {
             return None;
         }
-        let excess = match self.given_imitates(subject) {
-            true => f64::INFINITY,
-            false => self.judge().excess(self.as_given),
-        };
         Some(Null {
             evidence: self.evidence_of(self.given)?,
-            excess,
+            excess: self.judge().excess(self.as_given),
+            parameters: searched(self.given),
         })
     }
 
@@ -157,24 +150,27 @@ impl Session<'_> {
         Some(Null {
             evidence: self.evidence_of(hypothesis.judged.model())?,
             excess: self.judge().excess(&hypothesis.judged.held_out),
+            parameters: searched(hypothesis.judged.model()),
         })
     }
 
-    /// The certificate of `subject` against these null models; `None` without any.
+    /// The certificate of `subject` against these null models; `None` without any. `own` is ln of the evidence for its
+    /// effects, nats.
     fn certificate(
         &self,
         subject: &Hypothesis,
+        own: f64,
         nulls: &[Null],
         found: &Found,
     ) -> Option<Certificate> {
-        let own = self.evidence_of(subject.judged.model())?;
         let most = nulls.iter().map(|null| null.evidence).reduce(f64::max)?;
         let all = self.judge().first_fold();
         let mut records: Vec<String> = all.iter().map(|record| record.name.clone()).collect();
         records.dedup();
-        let left = self.judge().excess(&subject.judged.held_out);
-        let without = nulls.iter().map(|null| null.excess);
-        let without = without.fold(f64::INFINITY, f64::min);
+        let excess = |of: &Hypothesis| self.judge().excess(&of.judged.held_out);
+        let (left, root) = (excess(subject), excess(&found.root));
+        let real = nulls.iter().filter(|null| !null.imitates(subject, own));
+        let without = real.map(|null| null.excess).fold(root, f64::min);
         Some(Certificate {
             evidence_nats: own - most,
             log_e: log_e(own, most, found.tried),
@@ -184,8 +180,9 @@ impl Session<'_> {
         })
     }
 
-    /// The certificate of each effect of `subject`: the evidence of `subject` over the largest evidence of a model
-    /// with neither the effect nor another member of its equivalence set.
+    /// The certificate of each effect of `subject`: the largest evidence of the models with the effect over the largest of
+    /// the models that contain neither the effect nor another member of its equivalence set. Such a model may have more
+    /// evidence than `subject` because of its other terms; the effect is therefore also added to it.
     pub(super) fn certificates(
         &self,
         subject: &Hypothesis,
@@ -203,9 +200,9 @@ impl Session<'_> {
         let mut lesser: Vec<Option<Hypothesis>> = parallel::each(0..subject.terms.len(), without);
         // Null models are often common to several effects, so each is fitted once.
         let mut distinct: Vec<Hypothesis> = Vec::new();
-        let mut effects: Vec<(String, Vec<usize>)> = Vec::new();
-        for (index, effect) in subject.terms.iter().enumerate() {
-            let Some(effect) = effect.effect() else {
+        let mut effects: Vec<(&Term, Vec<usize>)> = Vec::new();
+        for (index, term) in subject.terms.iter().enumerate() {
+            let Some(effect) = term.effect() else {
                 continue;
             };
             let name = effect.name.to_owned();
@@ -227,15 +224,29 @@ impl Session<'_> {
                 })
             });
             let places = places.collect();
-            effects.push((name, places));
+            effects.push((term, places));
         }
         let nulls: Vec<Option<Null>> = parallel::each(&distinct, |null| self.null(null));
-        let certificates = effects.into_iter().filter_map(|(name, places)| {
+        let model = subject.judged.model();
+        let own = self.evidence_of(model);
+        let certificates = effects.into_iter().filter_map(|(term, places)| {
+            let name = term.effect()?.name;
             // Without the evidence of a null model nothing is certified.
-            let nulls: Option<Vec<Null>> = places.into_iter().map(|at| nulls[at]).collect();
-            let mut nulls = nulls?;
-            nulls.extend(self.given_without(subject, &[&name]));
-            Some((name, self.certificate(subject, &nulls, found)?))
+            let evident = |at: &usize| Some((*at, nulls[*at]?));
+            let own_nulls: Option<Vec<(usize, Null)>> = places.iter().map(evident).collect();
+            let own_nulls = own_nulls?;
+            let (most, null) = own_nulls
+                .iter()
+                .max_by(|a, b| a.1.evidence.total_cmp(&b.1.evidence))?;
+            let with = (Some(null.evidence) > own)
+                .then(|| self.search.with(&distinct[*most], term, model))
+                .flatten();
+            let with = with.and_then(|with| self.evidence_of(with.judged.model()));
+            let mut nulls: Vec<Null> = own_nulls.iter().map(|(_, null)| *null).collect();
+            nulls.extend(self.given_without(&[name]));
+            let evidence = own.into_iter().chain(with).reduce(f64::max)?;
+            let certificate = self.certificate(subject, evidence, &nulls, found)?;
+            Some((name.to_owned(), certificate))
         });
         certificates.collect()
     }
@@ -246,8 +257,30 @@ impl Session<'_> {
 struct Null {
     /// ln of the evidence, nats.
     evidence: f64,
-    /// Variance above the noise on the validation samples, y²; infinite for a model that imitates the effects.
+    /// Variance above the noise on the validation samples, y².
     excess: f64,
+    /// Number of coefficients, parameters and searched lags.
+    parameters: usize,
+}
+
+impl Null {
+    /// Whether the null model imitates the effects of `model`, with more parameters and less evidence. Its error is then
+    /// no measure of what the effects explain. `evidence` is that of `model`, nats.
+    fn imitates(&self, model: &Hypothesis, evidence: f64) -> bool {
+        self.parameters > searched(model.judged.model()) && self.evidence < evidence
+    }
+}
+
+/// Number of coefficients, parameters and searched lags of a model.
+fn searched(model: &Model) -> usize {
+    let lags = model.state_lags.iter().chain(&model.product_lags);
+    let lags: BTreeSet<&u16> = lags.filter(|lag| **lag > 2).collect();
+    count(model) + lags.len()
+}
+
+/// Number of coefficients and parameters of a model.
+fn count(model: &Model) -> usize {
+    model.coordinates().len()
 }
 
 /// Whether two hypotheses are the same model, found by two searches.

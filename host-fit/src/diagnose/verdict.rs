@@ -72,8 +72,8 @@ impl Session<'_> {
         self.without_what_lags_do(self.most_evident(found), &found.root)
     }
 
-    /// Removes effects from the best hypothesis while the hypothesis without the effect has more evidence. That
-    /// hypothesis is either refitted, or the best one without the effect that the search found.
+    /// Replaces the best hypothesis while another one has more evidence: without one of its effects, refitted or found by
+    /// the search, or such a result of the search with the effect added.
     fn most_evident(&self, found: &Found) -> Hypothesis {
         let mut best = found.best.clone();
         let Some(likelihood) = Likelihood::of(self.judge(), best.judged.model()) else {
@@ -88,21 +88,28 @@ impl Session<'_> {
         let mut own = evidence(&best);
         loop {
             let effects = best.terms.iter().enumerate();
-            let effects = effects.filter_map(|(i, term)| Some((i, term.effect()?)));
-            let lesser: Vec<Hypothesis> = effects
-                .flat_map(|(index, effect)| {
-                    [
-                        self.search.without(&best, index, &found.root),
-                        Hypothesis::best_without(found.all.iter(), &[effect.name]).cloned(),
-                    ]
-                })
-                .flatten()
-                .filter(may_stand)
+            let effects: Vec<(usize, &Term)> = effects
+                .filter(|(_, term)| term.effect().is_some())
                 .collect();
-            let evident = parallel::some(lesser, |lesser| Some((evidence(&lesser)?, lesser)));
+            let others = parallel::each(effects, |(index, term)| {
+                let name = term.effect().map_or("", |effect| effect.name);
+                let other = Hypothesis::best_without(found.all.iter(), &[name]).cloned();
+                let with = other
+                    .as_ref()
+                    .and_then(|other| self.search.with(other, term, best.judged.model()));
+                [self.search.without(&best, index, &found.root), other, with]
+            });
+            let others = others.into_iter().flatten().flatten().filter(may_stand);
+            let others: Vec<Hypothesis> = others.collect();
+            let evident = parallel::some(others, |other| Some((evidence(&other)?, other)));
+            let count = |of: &Hypothesis| of.terms.iter().filter_map(Term::effect).count();
             match evident.into_iter().max_by(|a, b| a.0.total_cmp(&b.0)) {
-                Some((most, lesser)) if own.is_none_or(|own| most >= own) => {
-                    (best, own) = (lesser, Some(most));
+                Some((most, other))
+                    if own.is_none_or(|own| {
+                        most > own || (most >= own && count(&other) < count(&best))
+                    }) =>
+                {
+                    (best, own) = (other, Some(most));
                 }
                 _ => return best,
             }
@@ -166,14 +173,15 @@ impl Session<'_> {
             effects: Vec::new(),
             p_value: None,
         };
-        // Effects on a base model with a larger error than the given model explain nothing. If the noise level is
-        // unknown, no effect is missing if the error of the given model is as small in practice.
+        // Effects on a base model with a larger error than the given model explain nothing, unless the given model
+        // imitates them. If the noise level is unknown, no effect is missing if the error of the given model is as small
+        // in practice.
         let margin = match judge.noise_source {
             NoiseSource::Scatter => RULES.worthwhile,
             NoiseSource::Measured | NoiseSource::Repeats => 0.0,
         };
         let no_better = (1.0 + margin) * best.judged.rmse() >= as_given.rmse();
-        if effects.is_empty() || no_better {
+        if effects.is_empty() || (no_better && !self.given_imitates(best)) {
             return of_bare();
         }
         let certificate = (!judge.drifts_more(&best.judged, &bare.judged))
@@ -183,16 +191,15 @@ impl Session<'_> {
         let Some(certificate) = certificate else {
             return of_bare();
         };
-        // The explained share is relative to the best model without these effects, which may be the given one. The
-        // certificate has the same reference, unless the given model already has one of the effects.
+        // Above the noise level, an effect is missing if the model explains most of what the best model without it leaves,
+        // even if that model imitates the effect.
         let is_reference = as_given.rmse() < bare.judged.rmse() && !self.given_imitates(best);
         let without = match is_reference {
             true => as_given,
             false => &bare.judged.held_out,
         };
-        let left =
-            judge.excess(&best.judged.held_out) / judge.excess(without).max(f64::MIN_POSITIVE);
-        let taken = 1.0 - left;
+        let taken = 1.0
+            - judge.excess(&best.judged.held_out) / judge.excess(without).max(f64::MIN_POSITIVE);
         let fits = self.fits(&best.judged);
         let explained = match judge.noise_source {
             NoiseSource::Scatter => taken >= RULES.explained_in_unknown_noise,
@@ -200,14 +207,12 @@ impl Session<'_> {
                 taken >= RULES.explained && judge.over_noise(best.judged.rmse()) <= TERMS.much
             }
         };
-        let leaner = is_leaner(best, bare);
-        // Near the noise level, even an effect with a small gain reaches that level.
-        let least = if fits || explained {
-            RULES.most
-        } else {
-            RULES.stands_in
+        // Where a model without the effects is at the noise level already, the little that is left above it is uncertain.
+        let least = match self.fits(&bare.judged) {
+            true => RULES.most,
+            false => RULES.stands_in,
         };
-        if taken < least && !(fits && leaner) {
+        if certificate.share < least {
             return of_bare();
         }
         Conclusion {
@@ -221,9 +226,4 @@ impl Session<'_> {
             p_value: Some(certificate.p_value()),
         }
     }
-}
-
-/// Whether effects fit equally well as additional lags, with fewer parameters.
-fn is_leaner(best: &Hypothesis, bare: &Hypothesis) -> bool {
-    best.judged.rmse() < (1.0 + RULES.alike) * bare.judged.rmse() && best.cost() < bare.cost()
 }

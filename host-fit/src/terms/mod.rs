@@ -18,6 +18,7 @@ mod follow;
 mod grid;
 mod hypothesis;
 mod input;
+mod instead;
 mod judge;
 mod laws;
 mod likelihood;

@@ -42,7 +42,7 @@ pub struct Screen<'a> {
     /// First scored sample of each record.
     from: Vec<usize>,
     /// Number of neighbouring samples that are averaged.
-    stride: usize,
+    pub(super) stride: usize,
     /// Number of joined values that belong to the estimation samples.
     pub(super) learned: usize,
     pub(super) runs: Vec<Vec<f64>>,
@@ -51,7 +51,7 @@ pub struct Screen<'a> {
     pub(super) basis: Vec<Vec<f64>>,
     /// For each leading direction of the basis: the coordinate it came from, and the components of that
     /// coordinate's sensitivity. The remaining directions are fixed delays.
-    made_by: Vec<(usize, Vec<f64>)>,
+    pub(super) made_by: Vec<(usize, Vec<f64>)>,
     /// Component of the error along each direction.
     own: Vec<f64>,
 }

@@ -265,6 +265,7 @@ impl Search<'_> {
             all.extend(anew);
         }
         let found = self.exchanged(found, &root, effort);
+        let found = self.with_effects_instead(found, &root, effort);
         Found {
             root,
             best: found,
@@ -471,7 +472,7 @@ impl Search<'_> {
     }
 
     /// Effects that a first-order screening cannot rate.
-    fn unseen(&self, screen: &Screen<'_>) -> impl Iterator<Item = Proposal> {
+    pub(super) fn unseen(&self, screen: &Screen<'_>) -> impl Iterator<Item = Proposal> {
         let model = screen.model();
         let specs = model
             .candidates()
@@ -594,6 +595,30 @@ impl Search<'_> {
         let term = &hypothesis.terms[index];
         let model = term.taken_from(hypothesis.judged.model(), root.judged.model());
         self.less(hypothesis, index, &model)
+    }
+
+    /// A hypothesis refitted with one more effect, from the effect's parameters in `like`. `None` if the effect is not in
+    /// `like`, if the model diverges, or if the effect goes to a bound of its range.
+    pub(crate) fn with(
+        &self,
+        hypothesis: &Hypothesis,
+        term: &Term,
+        like: &Model,
+    ) -> Option<Hypothesis> {
+        let name = term.effect()?.name;
+        let fitted = like.effects.iter().find(|added| added.name == name)?;
+        let term = term.with_parameters(fitted.parameters.clone());
+        let model = term.added_to(hypothesis.judged.model(), &[]);
+        let judged = self.judge.refitted(&model).ok()?;
+        if term.is_at_a_bound(judged.model()) {
+            return None;
+        }
+        let terms = [hypothesis.terms.clone(), vec![term]].concat();
+        Some(Hypothesis {
+            terms,
+            expanded: true,
+            ..Hypothesis::new(judged)
+        })
     }
 
     /// A hypothesis refitted without its `unwanted` effects, removed from the last to the first.

@@ -158,11 +158,11 @@ impl Term {
         other
     }
 
-    /// The effect with other starting values.
+    /// The effect, or term with a card, with other starting values.
     #[must_use]
     pub fn with_parameters(&self, values: Vec<f64>) -> Self {
         let mut other = self.clone();
-        if let Self::Effect { parameters, .. } = &mut other {
+        if let Self::Effect { parameters, .. } | Self::Path { parameters, .. } = &mut other {
             *parameters = values;
         }
         other
@@ -370,6 +370,37 @@ impl Term {
             }
         }
         model
+    }
+
+    /// Indices of the coordinates of `model` that belong to the term.
+    #[must_use]
+    pub(super) fn coordinates_in(&self, model: &Model) -> Vec<usize> {
+        let (lag, name) = match self {
+            Self::Memory(lag) | Self::State(lag) | Self::Product(lag) => (*lag, ""),
+            Self::Inertia(_) => (BEFORE, ""),
+            Self::LevelRate => (0, LEVEL_RATE.name),
+            Self::Wake(_) => (0, SLOW_WAKE.name),
+            Self::Offset => (0, ZERO_OFFSET.name),
+            Self::Path { spec, .. } | Self::Effect { spec, .. } => (0, spec.name),
+        };
+        if !name.is_empty() {
+            let all = model.coordinates().into_iter().enumerate();
+            let own = all.filter(|(_, own)| own.name.split('.').next() == Some(name));
+            return own.map(|(index, _)| index).collect();
+        }
+        let at = |lags: &[u16]| lags.iter().position(|own| *own == lag);
+        let (first, inputs, products) =
+            (1 + model.a.len(), model.b.len(), model.product_lags.len());
+        let state = at(&model.state_lags).map(|i| 1 + i);
+        let product = at(&model.product_lags);
+        let product = product
+            .into_iter()
+            .flat_map(|i| (0..inputs).map(move |input| first + inputs + input * products + i));
+        state
+            .filter(|_| self.reads_states() || matches!(self, Self::Inertia(_)))
+            .into_iter()
+            .chain(product.filter(|_| self.reads_products() || matches!(self, Self::Inertia(_))))
+            .collect()
     }
 
     /// The model with this term's lag moved to `lag`; `None` if another term has that lag.

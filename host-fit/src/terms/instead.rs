@@ -1,0 +1,349 @@
+//! Effects in place of several base terms at once.
+//!
+//! Lags and curves that were chosen before an effect was in the model imitate it, and no exchange of one term for
+//! another undoes this. Each effect is therefore fitted without the base terms, which then return with
+//! coefficients of 0. Those that are not needed beside the effect are dropped: first by a first-order prediction,
+//! then, for the effects with the best scores, by refits.
+
+use super::RULES;
+use super::effort::Effort;
+use super::hypothesis::{Hypothesis, score};
+use super::proposal::Proposal;
+use super::screen::Screen;
+use super::search::Search;
+use super::table::Table;
+use super::term::{Term, second_lag_s};
+use crate::fit::{Fit, FitOptions, fit, settle_fixed_delay};
+use crate::linalg::{dot, solve_symmetric};
+use crate::model::Model;
+use crate::order;
+use crate::parallel;
+use model_core::effect::Place;
+
+/// An effect with the base terms that are predicted to be needed beside it.
+struct Begun {
+    terms: Vec<Term>,
+    fit: Fit,
+    /// Predicted score.
+    score: f64,
+}
+
+impl Search<'_> {
+    /// Replaces base terms of a hypothesis by an effect if that lowers the score, and by further effects while the error is
+    /// above the noise level.
+    pub(super) fn with_effects_instead(
+        &self,
+        mut hypothesis: Hypothesis,
+        root: &Hypothesis,
+        effort: &mut Effort,
+    ) -> Hypothesis {
+        let mut enough = RULES.at_the_floor;
+        while (hypothesis.is_bare() || self.over(&hypothesis) > enough)
+            && let Some(better) = self.with_an_effect_instead(&hypothesis, root, effort)
+        {
+            hypothesis = better;
+            enough = RULES.near_the_floor;
+        }
+        hypothesis
+    }
+
+    /// The best hypothesis with one more effect and fewer base terms; `None` if none has a lower score.
+    fn with_an_effect_instead(
+        &self,
+        hypothesis: &Hypothesis,
+        root: &Hypothesis,
+        effort: &mut Effort,
+    ) -> Option<Hypothesis> {
+        let is_effect = |term: &Term| term.effect().is_some();
+        let (effects, bases): (Vec<Term>, Vec<Term>) =
+            hypothesis.terms.iter().cloned().partition(is_effect);
+        let full = effects.len() >= self.most_effects;
+        if !self.effects || full || bases.is_empty() || self.interrupted() || effort.is_spent() {
+            return None;
+        }
+        (self.progress)("effects in place of base terms");
+        let own = hypothesis.judged.model();
+        let lean = match effects.is_empty() {
+            true => root.judged.clone(),
+            false => {
+                let add = |model: Model, term: &Term| term.as_in(own).added_to(&model, &[]);
+                let lean = effects.iter().fold(root.judged.model().clone(), add);
+                self.judge.refitted(&lean).ok()?
+            }
+        };
+        let proposals = self.each_effect(lean.model());
+        proposals.iter().for_each(|_| effort.spend_on(own));
+        // A delay by whole samples has no derivative: a fit that starts with a path of the jets ends with it. Effects are
+        // therefore fitted without such terms, too.
+        let in_the_jet = |term: &Term| term.place() == Some(Place::Jet);
+        let mut bases = vec![bases];
+        if bases[0].iter().any(in_the_jet) {
+            let others = bases[0].iter().filter(|term| !in_the_jet(term));
+            bases.push(others.cloned().collect());
+        }
+        let all: Vec<(&Proposal, &Vec<Term>)> = proposals
+            .iter()
+            .flat_map(|proposal| bases.iter().map(move |bases| (proposal, bases)))
+            .collect();
+        let mut begun = parallel::some(&all, |(proposal, bases)| {
+            self.begun(hypothesis, &effects, bases, lean.model(), proposal)
+        });
+        order::ascending(&mut begun, |one| one.score);
+        begun.truncate(RULES.finished);
+        let finished = parallel::some(begun, |begun| {
+            self.finish(begun.terms, begun.fit, effects.len() + 1)
+        });
+        let pruned = finished
+            .into_iter()
+            .map(|finished| self.pruned(finished, root))
+            .filter(|pruned| !pruned.reaches_a_bound());
+        let best = pruned.min_by(|a, b| a.score().total_cmp(&b.score()))?;
+        (best.score() < hypothesis.score()).then_some(Hypothesis {
+            from_given: hypothesis.from_given,
+            ..best
+        })
+    }
+
+    /// Each effect of the catalogue at the grid point with the largest predicted gain on `model`.
+    fn each_effect(&self, model: &Model) -> Vec<Proposal> {
+        let Some(screen) = Screen::new(self.judge, model) else {
+            return Vec::new();
+        };
+        let table = Table::of(&screen, &self.known, true);
+        let mut met: Vec<&str> = Vec::new();
+        let mut all: Vec<Proposal> = Vec::new();
+        for candidate in &table.candidates {
+            let Some(spec) = candidate.term.effect() else {
+                continue;
+            };
+            if !met.contains(&spec.name) {
+                met.push(spec.name);
+                all.extend(screen.alone(&table, candidate));
+            }
+        }
+        let unseen = self.unseen(&screen).filter(|proposal| {
+            let mut effects = proposal.terms.iter().filter_map(Term::effect);
+            effects.all(|spec| !met.contains(&spec.name))
+        });
+        all.extend(unseen);
+        all
+    }
+
+    /// The fit of a proposal on `lean`, with the base terms of `hypothesis` that are predicted to be needed.
+    fn begun(
+        &self,
+        hypothesis: &Hypothesis,
+        effects: &[Term],
+        bases: &[Term],
+        lean: &Model,
+        proposal: &Proposal,
+    ) -> Option<Begun> {
+        if self.interrupted() {
+            return None;
+        }
+        let learning = self.judge.learning(0);
+        let options = |model: &Model| FitOptions {
+            iterations: RULES.brief,
+            ..self.judge.options_for(model)
+        };
+        let briefly = |model: &Model| fit(model, &learning, &options(model)).ok();
+        let with = self.set_out(lean, proposal, RULES.brief)?;
+        let own = hypothesis.judged.model();
+        let bases: Vec<Term> = bases.iter().map(|term| term.as_in(own)).collect();
+        let returned = bases
+            .iter()
+            .fold(with.model, |model, term| term.added_to(&model, &[]));
+        let joint = briefly(&returned)?;
+        let before = hypothesis.judged.fits[0].mean_square().sqrt();
+        let is_within = |fit: &Fit, factor: f64| fit.mean_square().sqrt() <= factor * before;
+        if !is_within(&joint, RULES.promising) {
+            return None;
+        }
+        let joint = briefly(&joint.model)?;
+        if !is_within(&joint, RULES.in_reach) {
+            return None;
+        }
+        let joint = settle_fixed_delay(joint, &learning, &options(&returned)).ok()?;
+        let screen = Screen::new(self.judge, &joint.model)?;
+        let (needless, loss) = screen.needless(&bases, lean, joint.sum_of_squares);
+        let mut model = joint.model.clone();
+        for term in needless.iter().rev().map(|index| &bases[*index]) {
+            model = term.taken_from(&model, lean);
+        }
+        let needed = (0..bases.len()).filter(|index| !needless.contains(index));
+        let needed = needed.map(|index| bases[index].clone());
+        let terms: Vec<Term> = effects
+            .iter()
+            .chain(&proposal.terms)
+            .cloned()
+            .chain(needed)
+            .collect();
+        let rmse = self.judge.held_out(|_| &joint.model).ok()?.rmse();
+        let cost: usize = terms.iter().map(Term::cost).sum();
+        Some(Begun {
+            score: score(rmse, cost) + loss,
+            fit: briefly(&model)?,
+            terms,
+        })
+    }
+}
+
+impl Screen<'_> {
+    /// The `terms` of this model that are not needed by a first-order prediction, and by how much ln of the error then
+    /// rises. A term is not needed if its penalty is larger than the rise. `sum` is the sum of squares of the error.
+    ///
+    /// Taking terms away changes the free run by Σd; the other parameters follow, and what remains of Σd raises the
+    /// sum of squares.
+    fn needless(&self, terms: &[Term], lean: &Model, sum: f64) -> (Vec<usize>, f64) {
+        struct Taken {
+            index: usize,
+            /// Directions of the basis along which no other parameter can follow are found from these coordinates.
+            coordinates: Vec<usize>,
+            along: Vec<f64>,
+            rest: Vec<f64>,
+        }
+        let taken = parallel::some(0..terms.len(), |index| {
+            let term = &terms[index];
+            let mut rest = self.change(&term.taken_from(self.model(), lean))?;
+            let along = self.residualise(&mut rest);
+            rest.truncate(self.learned);
+            let coordinates = term.coordinates_in(self.model());
+            Some(Taken {
+                index,
+                coordinates,
+                along,
+                rest,
+            })
+        });
+        let products: Vec<Vec<f64>> = taken
+            .iter()
+            .map(|a| taken.iter().map(|b| dot(&a.rest, &b.rest)).collect())
+            .collect();
+        let loss = |set: &[usize]| {
+            let mut outside = 0.0;
+            set.iter()
+                .for_each(|i| set.iter().for_each(|j| outside += products[*i][*j]));
+            let own: Vec<usize> = set
+                .iter()
+                .flat_map(|i| &taken[*i].coordinates)
+                .copied()
+                .collect();
+            let mut along = vec![0.0; self.basis.len()];
+            for i in set {
+                let pairs = along.iter_mut().zip(&taken[*i].along);
+                pairs.for_each(|(sum, x)| *sum += x);
+            }
+            let raised = outside + self.left_by_others(&along, &own);
+            0.5 * (raised * self.stride as f64 / sum.max(f64::MIN_POSITIVE)).ln_1p()
+        };
+        let price = |set: &[usize]| {
+            let cost: usize = set.iter().map(|i| terms[taken[*i].index].cost()).sum();
+            RULES.price * cost as f64
+        };
+        let mut set: Vec<usize> = Vec::new();
+        loop {
+            let others = (0..taken.len()).filter(|i| !set.contains(i));
+            let with = others.map(|i| {
+                let with = [set.as_slice(), &[i]].concat();
+                (loss(&with) - price(&with), with)
+            });
+            let Some((gain, with)) = with.min_by(|a, b| a.0.total_cmp(&b.0)) else {
+                break;
+            };
+            if gain >= loss(&set) - price(&set) {
+                break;
+            }
+            set = with;
+        }
+        let mut dropped: Vec<usize> = set.iter().map(|i| taken[*i].index).collect();
+        dropped.sort_unstable();
+        (dropped, loss(&set))
+    }
+
+    /// The squared length of what remains of a change along the basis when all parameters but those with these
+    /// coordinates follow it.
+    fn left_by_others(&self, along: &[f64], without: &[usize]) -> f64 {
+        let free = self.made_by.iter().enumerate();
+        let columns: Vec<Vec<f64>> = free
+            .filter(|(_, (index, _))| !without.contains(index))
+            .map(|(_, (_, made))| {
+                let mut column = made.clone();
+                column.resize(self.made_by.len(), 0.0);
+                column
+            })
+            .collect();
+        // Fixed delays, which are the last directions, follow too.
+        let along = &along[..self.made_by.len()];
+        let n = columns.len();
+        let products: Vec<f64> = (0..n * n)
+            .map(|at| {
+                let ridge = if at / n == at % n { 1.0 + 1e-12 } else { 1.0 };
+                ridge * dot(&columns[at / n], &columns[at % n])
+            })
+            .collect();
+        let right: Vec<f64> = columns.iter().map(|column| dot(column, along)).collect();
+        let whole = dot(along, along);
+        let Some(scale) = solve_symmetric(&products, &right) else {
+            return whole;
+        };
+        (whole - dot(&scale, &right)).max(0.0)
+    }
+}
+
+impl Term {
+    /// The term with the parameters that it has in `model`, as starting values.
+    fn as_in(&self, model: &Model) -> Self {
+        match self {
+            Self::Path { spec, .. } | Self::Effect { spec, .. } => {
+                let added = model.effects.iter().find(|added| added.name == spec.name);
+                added.map_or_else(
+                    || self.clone(),
+                    |added| self.with_parameters(added.parameters.clone()),
+                )
+            }
+            Self::Inertia(_) => second_lag_s(model).map_or_else(
+                || self.clone(),
+                |seconds| Self::Inertia(seconds / model.sample_period_s),
+            ),
+            other => other.clone(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::residual::plants::{base, records};
+    use crate::terms::Bench;
+    use model_core::effects::spec;
+    use std::sync::atomic::AtomicBool;
+
+    /// Two lags imitate a valve that opens and closes with different lags. No exchange of one lag for the valve has a
+    /// lower score, because the other lag still imitates it.
+    #[test]
+    fn an_effect_takes_the_place_of_the_lags_that_imitate_it() {
+        let records = records(&["valve-lag"], &[], 3);
+        let bench = Bench::of(&base(&records), &records).expect("records to learn from");
+        let never = AtomicBool::new(false);
+        let search = Search::silent(&bench.judge, 1, &never);
+        let root = Hypothesis::new(bench.judge.refitted(&bench.given).expect("stable"));
+        let bases = Search {
+            effects: false,
+            known: search.known.clone(),
+            ..search
+        };
+        let imitation = bases.run(root.clone(), None).best;
+        assert!(imitation.terms.len() > 1, "{}", imitation.words());
+        let mut effort = Effort::of_a_search();
+        let found = search.with_effects_instead(imitation.clone(), &root, &mut effort);
+        let valve = spec("valve-lag").expect("in the catalogue");
+        let names: Vec<&str> = found
+            .terms
+            .iter()
+            .filter_map(Term::effect)
+            .map(|effect| effect.name)
+            .collect();
+        assert_eq!(names, [valve.name], "{}", found.words());
+        assert!(found.cost() < imitation.cost() && found.score() < imitation.score());
+    }
+}

@@ -207,12 +207,31 @@ pub fn base_model(
         evaluations,
         stop,
     } = settled(&judge, judged, &how.settings, snapshots, interrupt);
+    let final_model = |judged: &Judged| units.model_out(&judge.final_fit(judged).model);
+    let mut others: Vec<&Hypothesis> = found.all.iter().chain(&roots).collect();
+    others.sort_by(|a, b| a.judged.size().total_cmp(&b.judged.size()));
+    let others = others.into_iter().map(|other| final_model(&other.judged));
+    let model = stable_one(final_model(&judged), others, records);
     Some(Ok(Automatic {
-        model: units.model_out(&judge.final_fit(&judged).model),
+        model,
         tried: found.tried,
         evaluations,
         stop,
     }))
+}
+
+/// `best`, or the first of the `others` without a diverging free run over the records if that of `best` diverges: close to
+/// an instability, the rounding of another unit decides. `best` if all diverge.
+fn stable_one(best: Model, others: impl Iterator<Item = Model>, records: &[Record]) -> Model {
+    let is_stable = |model: &Model| {
+        let runs = parallel::all(records, |record| model.free_run(record).ok());
+        runs.is_some()
+    };
+    if is_stable(&best) {
+        return best;
+    }
+    let mut others = others;
+    others.find(is_stable).unwrap_or(best)
 }
 
 /// The best first- or second-order model among the fitted structures, if its score is close to that of the best
@@ -302,5 +321,29 @@ fn on_samples_unless_it_costs(judge: &Judge, judged: Judged) -> Judged {
     match judge.refitted(&model) {
         Ok(rounded) if rounded.rmse() < (1.0 + RULES.rounding) * judged.rmse() => rounded,
         _ => judged,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::data::Use;
+
+    #[test]
+    fn a_model_that_diverges_gives_way_to_the_next_one() {
+        let u: Vec<f64> = (0..2000).map(|k| f64::from(u8::from(k >= 100))).collect();
+        let record = Record::new("step", Use::Identify, 0.001, u.clone(), u);
+        let with_pole = |a: f64| Model {
+            a: vec![a],
+            b: vec![0.1],
+            ..Model::default()
+        };
+        let chosen = |best: f64, others: &[f64]| {
+            let others = others.iter().map(|a| with_pole(*a));
+            stable_one(with_pole(best), others, std::slice::from_ref(&record)).a[0]
+        };
+        assert_eq!(chosen(0.9, &[0.5]), 0.9);
+        assert_eq!(chosen(1.05, &[1.02, 0.5, 0.6]), 0.5);
+        assert_eq!(chosen(1.05, &[1.02]), 1.05);
     }
 }

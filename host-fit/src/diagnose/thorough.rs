@@ -80,6 +80,7 @@ impl Search<'_> {
                 }
             }
         }
+        self.with_effects_instead(&mut found);
         (found, origin)
     }
 }

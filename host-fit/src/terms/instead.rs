@@ -6,11 +6,10 @@
 //! then, for the effects with the best scores, by refits.
 
 use super::RULES;
-use super::effort::Effort;
 use super::hypothesis::{Hypothesis, score};
 use super::proposal::Proposal;
 use super::screen::Screen;
-use super::search::Search;
+use super::search::{Found, Search};
 use super::table::Table;
 use super::term::{Term, second_lag_s};
 use crate::fit::{Fit, FitOptions, fit, settle_fixed_delay};
@@ -29,36 +28,27 @@ struct Begun {
 }
 
 impl Search<'_> {
-    /// Replaces base terms of a hypothesis by an effect if that lowers the score, and by further effects while the error is
-    /// above the noise level.
-    pub(super) fn with_effects_instead(
-        &self,
-        mut hypothesis: Hypothesis,
-        root: &Hypothesis,
-        effort: &mut Effort,
-    ) -> Hypothesis {
+    /// Replaces base terms of the best hypothesis by an effect if that lowers the score, and by further effects while the
+    /// error is above the noise level.
+    pub(crate) fn with_effects_instead(&self, found: &mut Found) {
         let mut enough = RULES.at_the_floor;
-        while (hypothesis.is_bare() || self.over(&hypothesis) > enough)
-            && let Some(better) = self.with_an_effect_instead(&hypothesis, root, effort)
+        while (found.best.is_bare() || self.over(&found.best) > enough)
+            && let Some(better) = self.with_an_effect_instead(found)
         {
-            hypothesis = better;
+            found.all.push(better.clone());
+            found.best = better;
             enough = RULES.near_the_floor;
         }
-        hypothesis
     }
 
     /// The best hypothesis with one more effect and fewer base terms; `None` if none has a lower score.
-    fn with_an_effect_instead(
-        &self,
-        hypothesis: &Hypothesis,
-        root: &Hypothesis,
-        effort: &mut Effort,
-    ) -> Option<Hypothesis> {
+    fn with_an_effect_instead(&self, found: &mut Found) -> Option<Hypothesis> {
+        let (hypothesis, root) = (&found.best, &found.root);
         let is_effect = |term: &Term| term.effect().is_some();
         let (effects, bases): (Vec<Term>, Vec<Term>) =
             hypothesis.terms.iter().cloned().partition(is_effect);
         let full = effects.len() >= self.most_effects;
-        if !self.effects || full || bases.is_empty() || self.interrupted() || effort.is_spent() {
+        if !self.effects || full || bases.is_empty() || self.interrupted() {
             return None;
         }
         (self.progress)("effects in place of base terms");
@@ -72,7 +62,6 @@ impl Search<'_> {
             }
         };
         let proposals = self.each_effect(lean.model());
-        proposals.iter().for_each(|_| effort.spend_on(own));
         // A delay by whole samples has no derivative: a fit that starts with a path of the jets ends with it. Effects are
         // therefore fitted without such terms, too.
         let in_the_jet = |term: &Term| term.place() == Some(Place::Jet);
@@ -90,6 +79,7 @@ impl Search<'_> {
         });
         order::ascending(&mut begun, |one| one.score);
         begun.truncate(RULES.finished);
+        found.tried += begun.len();
         let finished = parallel::some(begun, |begun| {
             self.finish(begun.terms, begun.fit, effects.len() + 1)
         });
@@ -337,8 +327,13 @@ mod tests {
         };
         let imitation = bases.run(root.clone(), None).best;
         assert!(imitation.terms.len() > 1, "{}", imitation.words());
-        let mut effort = Effort::of_a_search();
-        let found = search.with_effects_instead(imitation.clone(), &root, &mut effort);
+        let mut found = Found {
+            root,
+            best: imitation.clone(),
+            ..imitation.clone().alone()
+        };
+        search.with_effects_instead(&mut found);
+        let found = found.best;
         let valve = spec("valve-lag").expect("in the catalogue");
         let names: Vec<&str> = found
             .terms

@@ -265,7 +265,6 @@ impl Search<'_> {
             all.extend(anew);
         }
         let found = self.exchanged(found, &root, effort);
-        let found = self.with_effects_instead(found, &root, effort);
         Found {
             root,
             best: found,

@@ -205,7 +205,7 @@ pub struct Diagnosis {
     pub evidence_nats: Option<f64>,
     /// The certificate of each effect of the best model, named or not.
     pub certificates: BTreeMap<String, Certificate>,
-    /// Parsimony: the model with `missing` has more evidence than the given model, with fewer parameters.
+    /// Parsimony: the model with `missing` or `certified` has more evidence than the given model, with fewer parameters.
     pub parsimony: Option<Parsimony>,
     /// Posterior probability of each member of each set in `sets`.
     pub posterior: Vec<Vec<f64>>,

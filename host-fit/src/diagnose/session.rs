@@ -227,8 +227,8 @@ impl Session<'_> {
             .iter()
             .filter(|_| verdict == Verdict::PartlyExplained);
         let certified = certified.filter(|name| is_certified(name));
-        let certified = certified.cloned().collect();
-        let parsimony = self.parsimony(&last, &missing);
+        let certified: Vec<String> = certified.cloned().collect();
+        let parsimony = self.parsimony(&last, if claims { &missing } else { &certified });
         Diagnosis {
             verdict,
             sets: sets.iter().map(Set::names).collect(),

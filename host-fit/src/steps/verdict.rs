@@ -165,20 +165,20 @@ fn finding(diagnosis: &Diagnosis, plant: Plant) -> Answer {
                 Tone::Finding,
                 format!("{}, and something is unexplained", missing(names, &[])),
             )
-            .evidence(format!(
-                "With {} the {error} falls {}.",
-                joined(&diagnosis.stand_ins),
-                from_to(first, last, diagnosis)
-            ))
+            .evidence(fall(diagnosis, &joined(&diagnosis.stand_ins)))
             .confidence(format!(
-                "Certified at a level of {} %. {} {:.0} % of the variance that is unexplained without it. The \
+                "Certified at a level of {} %. {} {:.0} % of the variance that {} unexplained without it. The \
                  cause of the remaining error is not identified.",
                 significant(100.0 * alpha, 2),
                 match names.len() {
                     1 => "It explains",
                     _ => "Each explains at least",
                 },
-                100.0 * share
+                100.0 * share,
+                match imitated(diagnosis) {
+                    Some(_) => "the model with the fewest lags leaves",
+                    None => "is",
+                }
             ))
             .next(add(names))
         }
@@ -236,18 +236,35 @@ fn fall(diagnosis: &Diagnosis, with: &str) -> String {
     let rmse = |rung: Option<&Rung>| rung.map_or(f64::NAN, |rung| rung.validate_rmse);
     let [given, last] = [diagnosis.ladder.first(), diagnosis.ladder.last()].map(rmse);
     let error = diagnosis.held_out_by.compared().name();
-    let fewest = diagnosis.ladder.get(1);
-    let lags_do = last > (1.0 - RULES.worthwhile) * given;
-    match fewest.filter(|rung| lags_do && rung.effects.is_empty()) {
+    match imitated(diagnosis) {
         Some(fewest) => format!(
-            "On the model with the fewest lags, {with} lowers the {error} {}. Additional lags in its place fit equally well.",
-            from_to(rmse(Some(fewest)), last, diagnosis)
+            "On the model with the fewest lags, {with} lowers the {error} {}. Additional lags in its place fit equally well{}.",
+            from_to(fewest.validate_rmse, last, diagnosis),
+            match &diagnosis.parsimony {
+                Some(parsimony) => format!(
+                    ", with {} and {:.0} nats less evidence",
+                    match parsimony.terms_fewer {
+                        1 => "one parameter more".to_owned(),
+                        fewer => format!("{fewer} parameters more"),
+                    },
+                    parsimony.nats
+                ),
+                None => String::new(),
+            }
         ),
         None => format!(
             "With {with} the {error} falls {}.",
             from_to(given, last, diagnosis)
         ),
     }
+}
+
+/// The step of the ladder with the fewest lags, if the given model fits as well as the final one: it imitates the effects.
+fn imitated(diagnosis: &Diagnosis) -> Option<&Rung> {
+    let [given, last] = [diagnosis.ladder.first()?, diagnosis.ladder.last()?];
+    let lags_do = last.validate_rmse > (1.0 - RULES.worthwhile) * given.validate_rmse;
+    let fewest = diagnosis.ladder.get(1)?;
+    (lags_do && fewest.effects.is_empty()).then_some(fewest)
 }
 
 /// The behaviour behind each missing effect, in words.

@@ -178,7 +178,7 @@ mod tests {
                 r.channel = Some(channel());
                 needs(m, "temperature");
             }),
-            ("at a rail", |r, m| {
+            ("at an end of the converter", |r, m| {
                 r.channel = Some(ChannelEntry {
                     per_count: 1e-3,
                     ..channel()

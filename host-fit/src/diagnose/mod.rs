@@ -51,7 +51,7 @@ pub enum DiagnoseError {
     #[error(transparent)]
     Simulate(#[from] SimulateError),
     /// The user stopped the diagnosis.
-    #[error("the diagnosis was interrupted before it had a result; nothing was written.")]
+    #[error("the search was interrupted before it had a result; nothing was written.")]
     Interrupted,
 }
 
@@ -155,9 +155,12 @@ fn chosen(
         let root = search.root(&given_inside, mid_run)?;
         (root, "refitted with the fewest lags")
     };
-    if interrupt.load(Ordering::Relaxed) {
-        return Err(DiagnoseError::Interrupted);
-    }
+    // A verdict of an incomplete search or test would be wrong.
+    let complete = || match interrupt.load(Ordering::Relaxed) {
+        true => Err(DiagnoseError::Interrupted),
+        false => Ok(()),
+    };
+    complete()?;
     let starts = Given {
         model: &given_inside,
         rmse: as_given.rmse(),
@@ -165,9 +168,11 @@ fn chosen(
         root: &|model| search.root(model, mid_run),
     };
     let (found, origin) = search.thorough(root, &starts);
+    complete()?;
     let restarted_s = restarted.map(|samples| samples as f64 * given.sample_period_s);
     let second = session.rung(&origin.judged, &[], step);
     let rungs = [first.clone(), second];
     let concluded = session.conclude(found, rungs, restarted_s);
+    complete()?;
     Ok(concluded.no_worse_than(given, first))
 }

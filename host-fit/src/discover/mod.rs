@@ -218,6 +218,10 @@ pub fn discover(
         }
     }
     let separation = finder.separation(&terms, &model);
+    // The result of an incomplete search would be wrong.
+    if interrupt.load(Ordering::Relaxed) {
+        return Err(DiagnoseError::Interrupted);
+    }
     let scored = judge.held_out_by.judged().records();
     let terms = terms
         .iter()

@@ -191,8 +191,8 @@ impl Session<'_> {
         let Some(certificate) = certificate else {
             return of_bare();
         };
-        // Above the noise level, an effect is missing if the model explains most of what the best model without it leaves,
-        // even if that model imitates the effect.
+        // Above the noise level, an effect is missing if it explains most of what the given model leaves, or the best model
+        // without effects if that has a smaller error or the given one imitates the effect.
         let is_reference = as_given.rmse() < bare.judged.rmse() && !self.given_imitates(best);
         let without = match is_reference {
             true => as_given,

@@ -11,7 +11,7 @@ use super::proposal::Proposal;
 use super::screen::Screen;
 use super::search::{Found, Search};
 use super::table::Table;
-use super::term::{Term, second_lag_s};
+use super::term::Term;
 use crate::fit::{Fit, FitOptions, fit, settle_fixed_delay};
 use crate::linalg::{dot, solve_symmetric};
 use crate::model::Model;
@@ -280,26 +280,6 @@ impl Screen<'_> {
             return whole;
         };
         (whole - dot(&scale, &right)).max(0.0)
-    }
-}
-
-impl Term {
-    /// The term with the parameters that it has in `model`, as starting values.
-    fn as_in(&self, model: &Model) -> Self {
-        match self {
-            Self::Path { spec, .. } | Self::Effect { spec, .. } => {
-                let added = model.effects.iter().find(|added| added.name == spec.name);
-                added.map_or_else(
-                    || self.clone(),
-                    |added| self.with_parameters(added.parameters.clone()),
-                )
-            }
-            Self::Inertia(_) => second_lag_s(model).map_or_else(
-                || self.clone(),
-                |seconds| Self::Inertia(seconds / model.sample_period_s),
-            ),
-            other => other.clone(),
-        }
     }
 }
 

@@ -596,17 +596,15 @@ impl Search<'_> {
         self.less(hypothesis, index, &model)
     }
 
-    /// A hypothesis refitted with one more effect, from the effect's parameters in `like`. `None` if the effect is not in
-    /// `like`, if the model diverges, or if the effect goes to a bound of its range.
+    /// A hypothesis refitted with one more term, from the term's parameters in `like`. `None` if the model diverges, or if
+    /// the term goes to a bound of its range.
     pub(crate) fn with(
         &self,
         hypothesis: &Hypothesis,
         term: &Term,
         like: &Model,
     ) -> Option<Hypothesis> {
-        let name = term.effect()?.name;
-        let fitted = like.effects.iter().find(|added| added.name == name)?;
-        let term = term.with_parameters(fitted.parameters.clone());
+        let term = term.as_in(like);
         let model = term.added_to(hypothesis.judged.model(), &[]);
         let judged = self.judge.refitted(&model).ok()?;
         if term.is_at_a_bound(judged.model()) {

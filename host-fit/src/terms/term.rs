@@ -372,6 +372,25 @@ impl Term {
         model
     }
 
+    /// The term with the parameters that it has in `model`, as starting values.
+    #[must_use]
+    pub(super) fn as_in(&self, model: &Model) -> Self {
+        match self {
+            Self::Path { spec, .. } | Self::Effect { spec, .. } => {
+                let added = model.effects.iter().find(|added| added.name == spec.name);
+                added.map_or_else(
+                    || self.clone(),
+                    |added| self.with_parameters(added.parameters.clone()),
+                )
+            }
+            Self::Inertia(_) => second_lag_s(model).map_or_else(
+                || self.clone(),
+                |seconds| Self::Inertia(seconds / model.sample_period_s),
+            ),
+            other => other.clone(),
+        }
+    }
+
     /// Indices of the coordinates of `model` that belong to the term.
     #[must_use]
     pub(super) fn coordinates_in(&self, model: &Model) -> Vec<usize> {

@@ -322,11 +322,19 @@ fn overfitted(scores: &Scores, model: &Model) -> Option<String> {
 /// use host_fit::data::DataSet;
 /// use host_fit::steps::{DelayKind, IdentifyRequest, identify};
 ///
-/// let set = DataSet::load("../data/paper-like".as_ref())?; // One lag of each kind, for a short example; without
-/// these counts the structure is chosen by validation error. let request = IdentifyRequest { delay:
-/// Some(DelayKind::Fixed), n1: Some(1), n2: Some(1), max_lag: Some(80), evaluations: 200,
-/// ..IdentifyRequest::default() }; let found = identify(&set, &request, &())?; assert_eq!(found.delays.state.len(),
-/// 1); assert!(found.scores.validate.is_some_and(|held_out| held_out.fit_percent > 50.0));
+/// let set = DataSet::load("../data/paper-like".as_ref())?;
+/// // One lag of each kind, for a short example; without these counts the structure is chosen by validation error.
+/// let request = IdentifyRequest {
+///     delay: Some(DelayKind::Fixed),
+///     n1: Some(1),
+///     n2: Some(1),
+///     max_lag: Some(80),
+///     evaluations: 200,
+///     ..IdentifyRequest::default()
+/// };
+/// let found = identify(&set, &request, &())?;
+/// assert_eq!(found.delays.state.len(), 1);
+/// assert!(found.scores.validate.is_some_and(|held_out| held_out.fit_percent > 50.0));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 ///

@@ -75,9 +75,9 @@ pub(crate) fn estimates_among(
     .collect()
 }
 
-/// Whether these intervals identify an effect: that of its amplitude excludes 0, and that of at least one positive
-/// parameter is narrower than a factor. Two parameters may be correlated, for example those of King's law; then only a
-/// combination of them is identifiable.
+/// Whether these intervals identify an effect: that of its amplitude excludes 0, that of a parameter below another
+/// excludes the other's value, and that of at least one positive parameter is narrower than a factor. Two parameters may
+/// be correlated, for example those of King's law; then only a combination of them is identifiable.
 pub(super) fn is_identified(estimates: &BTreeMap<String, ParameterEstimate>, spec: &Spec) -> bool {
     let amplitude = spec.amplitude.filter(|amplitude| amplitude.linear);
     let amplitude = amplitude.and_then(|amplitude| estimates.get(amplitude.parameter));
@@ -87,7 +87,13 @@ pub(super) fn is_identified(estimates: &BTreeMap<String, ParameterEstimate>, spe
         .filter(|one| one.low < one.high)
         .map(|one| one.high / one.low);
     let least = spans.next().map(|first| spans.fold(first, f64::min));
-    amplitude.is_none_or(|one| one.low > 0.0 || one.high < 0.0)
+    let separate = spec.parameters.iter().all(|card| {
+        let other = card.below.and_then(|other| estimates.get(other));
+        let pair = estimates.get(card.name).zip(other);
+        pair.is_none_or(|(own, other)| own.high < other.value)
+    });
+    separate
+        && amplitude.is_none_or(|one| one.low > 0.0 || one.high < 0.0)
         && least.is_none_or(|least| least < RULES.identified)
 }
 
@@ -135,6 +141,21 @@ mod tests {
         assert!(known(0.1, 0.5, 0.05));
         assert!(!known(-0.1, 0.7, 0.05));
         assert!(!known(0.1, 0.5, 3.0));
+    }
+
+    /// A relay that never switches back in the records has no hysteresis there.
+    #[test]
+    fn a_lower_threshold_that_may_be_the_upper_one_is_not_known() {
+        let known = |highest| {
+            let intervals = [
+                ("gain", 0.2, 0.3, 0.4),
+                ("lower_threshold", 0.1, 0.15, highest),
+                ("upper_threshold", 0.35, 0.4, 0.45),
+            ];
+            known_to("attachment-hysteresis", &intervals)
+        };
+        assert!(known(0.2));
+        assert!(!known(0.5));
     }
 
     /// Ratio and offset of King's law are correlated: one of them is enough.

@@ -8,7 +8,7 @@ use crate::data::Record;
 use crate::model::{Delay, Model};
 use crate::order;
 use crate::parallel;
-use model_core::effect::{Place, Spec};
+use model_core::effect::{Needs, Place, Spec};
 use model_core::recursion::Grading;
 use std::cmp::Ordering;
 use thiserror::Error;
@@ -61,14 +61,7 @@ pub fn fit_with_effect(
         .iter()
         .map(|parameters| with(base, parameters))
         .collect();
-    if spec.parameters.is_empty() {
-        // A minimum without the effect may be a bad starting point for the model with it, so fresh starting points
-        // are tried too.
-        let fresh = fresh_starts(base, records);
-        models.extend(fresh.iter().map(|base| with(base, &[])));
-    }
-    if base.measured_inputs().any(|input| input.name == spec.name) {
-        // A base model fitted without an input has a wrong delay and time constant.
+    if needs_fresh_starts(base, spec) {
         let few = starts(base, spec, records);
         let few = few.iter().step_by((few.len() / RULES.input_starts).max(1));
         let fresh = fresh_starts(base, records);
@@ -111,6 +104,18 @@ pub fn fit_with_effect(
         .ok_or_else(|| CandidateError::Unstable {
             effect: spec.name.to_owned(),
         })
+}
+
+/// Whether a base model fitted without this effect is a bad starting point for the model with it. A sensor that shows
+/// only the size of the friction and a measured input change the gain, the delay and the time constant of the base; a
+/// pickup can pull the delay of the base to 0, where the two cannot be distinguished.
+#[must_use]
+pub fn needs_fresh_starts(base: &Model, spec: &Spec) -> bool {
+    let dead_time = base.delay.present(0.0, base.sample_period_s);
+    let at_once = spec.needs == Needs::DeadTime && spec.needs.unmet(true, dead_time).is_some();
+    at_once
+        || spec.parameters.is_empty()
+        || base.measured_inputs().any(|input| input.name == spec.name)
 }
 
 /// Several starting points after a few iterations each, best first. Fewer iterations would rank thresholds poorly,

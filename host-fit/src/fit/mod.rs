@@ -11,7 +11,7 @@ mod rules;
 mod starts;
 
 pub(crate) use candidate::channel_reference;
-pub use candidate::{CandidateError, fit_with_effect};
+pub use candidate::{CandidateError, fit_with_effect, needs_fresh_starts};
 pub use drift::restart_after;
 pub(crate) use drift::{pieces, pieces_of};
 pub use free_run::{Fit, FitOptions, fit, sensitivities};

@@ -46,10 +46,6 @@ pub(super) fn grid(spec: &Spec, model: &Model, known: &Known) -> Vec<Vec<f64>> {
             logarithmic(p, RULES.grid_of_frequencies)
         } else if p.is_logarithmic() {
             logarithmic(p, points)
-        } else if p.unit == Unit::Y {
-            let (low, high) = (facts.quantile(0.05), facts.quantile(0.95));
-            let levels = RULES.grid_of_levels.iter();
-            levels.map(|q| low + q * (high - low)).collect()
         } else {
             let values = p.starts.iter();
             values
@@ -57,18 +53,7 @@ pub(super) fn grid(spec: &Spec, model: &Model, known: &Known) -> Vec<Vec<f64>> {
                 .collect()
         }
     };
-    let mut all = combinations(spec.parameters.iter().map(along));
-    // In a pair of levels, the first is the upper one.
-    let levels: Vec<usize> = (0..spec.parameters.len())
-        .filter(|i| {
-            let p = &spec.parameters[*i];
-            p.unit == Unit::Y && !scales(p)
-        })
-        .collect();
-    if let [first, second] = levels.as_slice() {
-        all.retain(|values| values[*first] > values[*second]);
-    }
-    all
+    combinations(spec.parameters.iter().map(along))
 }
 
 /// Midpoints of equal parts of a logarithmic range.

@@ -111,11 +111,21 @@ impl Search<'_> {
                 all.extend(screen.alone(&table, candidate));
             }
         }
-        let unseen = self.unseen(&screen).filter(|proposal| {
-            let mut effects = proposal.terms.iter().filter_map(Term::effect);
-            effects.all(|spec| !met.contains(&spec.name))
-        });
-        all.extend(unseen);
+        let anew = model
+            .candidates()
+            .filter(|spec| self.is_fitted_anew(model, spec));
+        let others = self
+            .unseen(&screen)
+            .chain(anew.map(|spec| Proposal::unrated(spec, model)));
+        for proposal in others {
+            let Some(spec) = proposal.terms.iter().find_map(Term::effect) else {
+                continue;
+            };
+            if !met.contains(&spec.name) {
+                met.push(spec.name);
+                all.push(proposal);
+            }
+        }
         all
     }
 
@@ -137,7 +147,17 @@ impl Search<'_> {
             ..self.judge.options_for(model)
         };
         let briefly = |model: &Model| fit(model, &learning, &options(model)).ok();
-        let with = self.set_out(lean, proposal, RULES.brief)?;
+        let with = match &proposal.terms[..] {
+            [Term::Effect { spec, .. }] if self.is_fitted_anew(lean, spec) => {
+                self.fitted_anew(lean, spec, &options(lean))?
+            }
+            _ => self.set_out(lean, proposal, RULES.brief)?,
+        };
+        let added: Vec<Term> = proposal
+            .terms
+            .iter()
+            .map(|term| term.as_in(&with.model))
+            .collect();
         let own = hypothesis.judged.model();
         let bases: Vec<Term> = bases.iter().map(|term| term.as_in(own)).collect();
         let returned = bases
@@ -164,7 +184,7 @@ impl Search<'_> {
         let needed = needed.map(|index| bases[index].clone());
         let terms: Vec<Term> = effects
             .iter()
-            .chain(&proposal.terms)
+            .chain(&added)
             .cloned()
             .chain(needed)
             .collect();

@@ -25,6 +25,7 @@ mod likelihood;
 mod linear;
 mod proposal;
 mod resampling;
+mod roots;
 mod rules;
 mod screen;
 mod search;

@@ -5,9 +5,10 @@ use super::screen::Screen;
 use super::table::{Candidate, Table};
 use super::term::Term;
 use crate::linalg::{dot, solve_symmetric};
+use crate::model::Model;
 use crate::order;
 use crate::parallel;
-use model_core::effect::Place;
+use model_core::effect::{Place, Spec};
 
 /// Terms to add together, with their predicted gain.
 #[derive(Clone, Debug)]
@@ -20,6 +21,24 @@ pub struct Proposal {
     pub left: f64,
     /// ½ ln of `left` plus the penalty of the terms; negative if the gain exceeds the penalty.
     pub score: f64,
+}
+
+impl Proposal {
+    /// An effect without a prediction, for `model`.
+    pub(super) fn unrated(spec: &'static Spec, model: &Model) -> Self {
+        let term = Term::Effect {
+            spec,
+            parameters: spec.parameters.iter().map(|p| p.starts[0]).collect(),
+            grading: model.grading,
+            reference: None,
+        };
+        Self {
+            terms: vec![term],
+            coefficients: vec![Vec::new()],
+            left: 1.0,
+            score: 0.0,
+        }
+    }
 }
 
 impl Screen<'_> {

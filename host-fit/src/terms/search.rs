@@ -9,14 +9,12 @@ use super::proposal::Proposal;
 use super::screen::Screen;
 use super::table::{Table, has_jet_effect};
 use super::term::Term;
-use crate::fit::{Fit, FitOptions, Known, fit, fit_with_effect, lean_base};
-use crate::model::{Model, Start};
+use crate::fit::{Fit, FitOptions, Known, fit};
+use crate::model::Model;
 use crate::order;
 use crate::parallel;
 use crate::residual::NoiseSource;
-use crate::simulate::SimulateError;
 use model_core::effect::Spec;
-use model_core::effects::NUISANCES;
 use std::cmp::Ordering;
 use std::sync::atomic::{AtomicBool, Ordering as Memory};
 
@@ -119,105 +117,6 @@ impl Search<'_> {
     /// Whether the error is far above a known noise level.
     fn leaves_much(&self, hypothesis: &Hypothesis) -> bool {
         self.judge.noise_source != NoiseSource::Scatter && self.over(hypothesis) > RULES.much
-    }
-
-    /// The lowest-order model with the kind of delay law and the effects of `given`. With `mid_run`, free
-    /// runs start from the measurement.
-    ///
-    /// # Errors
-    /// No starting point gives a stable free run.
-    pub fn root(&self, given: &Model, mid_run: bool) -> Result<Hypothesis, SimulateError> {
-        let learning = self.judge.learning(0);
-        let mut bare = given.clone();
-        // Effects that the user added stay; drift and other disturbance terms must lower the error again to be
-        // kept.
-        let mut kept = std::mem::take(&mut bare.effects);
-        kept.retain(|added| NUISANCES.iter().all(|spec| spec.name != added.name));
-        let mut model = lean_base(&bare, &learning)?.model;
-        model.effects.clone_from(&kept);
-        let mut own = Model {
-            effects: kept,
-            ..given.clone()
-        };
-        for model in [&mut model, &mut own] {
-            model.delay_between_samples();
-            if mid_run {
-                model.start = Start::Measured;
-            }
-        }
-        // A base that was fitted without the kept effects may diverge with them; the given one was fitted with them.
-        let refitted = self.judge.refitted(&model);
-        let mut judged = refitted.or_else(|error| self.judge.refitted(&own).map_err(|_| error))?;
-        if !self.judge.on_off {
-            // Graded commands identify the response to jets of part strength.
-            let others = self.judge.other_gradings(judged.model().grading);
-            let others = parallel::some(others, |grading| {
-                let other = Model {
-                    grading,
-                    ..judged.model().clone()
-                };
-                self.judge.refitted(&other).ok()
-            });
-            let better = others
-                .into_iter()
-                .min_by(|a, b| a.rmse().total_cmp(&b.rmse()));
-            if let Some(better) = better.filter(|better| better.rmse() < judged.rmse()) {
-                judged = better;
-            }
-        }
-        Ok(Hypothesis::new(judged))
-    }
-
-    /// The structure of `given`, refitted and expressed as terms on top of `root`: a second starting point.
-    /// `None` if it has other or too many terms.
-    #[must_use]
-    pub fn second_root(&self, given: &Model, root: &Hypothesis) -> Option<Hypothesis> {
-        let mut model = given.clone();
-        model.delay_between_samples();
-        model.start = root.judged.model().start;
-        let terms = Term::all_of(&model, root.judged.model())?;
-        let judged = (!terms.is_empty() && terms.len() <= RULES.most_given)
-            .then(|| self.judge.refitted(&model).ok())??;
-        Some(Hypothesis {
-            terms,
-            from_given: true,
-            ..Hypothesis::new(judged)
-        })
-    }
-
-    /// Further roots: the structure of `given`, and `root` with each measured input. Without such an input the
-    /// lowest-order model has a wrong delay and time constant, from which a few iterations do not return. Both are
-    /// therefore fitted from fresh starts.
-    pub(crate) fn second_roots(&self, given: &Model, root: &Hypothesis) -> Vec<Hypothesis> {
-        let base = root.judged.model();
-        let learning = self.judge.learning(0);
-        let inputs = base.measured_inputs().filter_map(|spec| {
-            if !self.effects || self.interrupted() || base.has_effect(spec.name) {
-                return None;
-            }
-            (self.progress)(&format!("{} from fresh starts", spec.name));
-            let fit = fit_with_effect(base, spec, &learning, &FitOptions::default()).ok()?;
-            let mut model = fit.model;
-            model.delay_between_samples();
-            model.start = base.start;
-            let judged = self.judge.refitted(&model).ok()?;
-            let added = judged.model().effects.iter();
-            let added = added.rev().find(|added| added.name == spec.name)?;
-            let term = Term::Effect {
-                spec,
-                parameters: added.parameters.clone(),
-                grading: model.grading,
-                reference: added.reference,
-            };
-            Some(Hypothesis {
-                terms: vec![term],
-                ..Hypothesis::new(judged)
-            })
-        });
-        self.second_root(given, root)
-            .into_iter()
-            .chain(inputs)
-            .collect()
     }
 
     /// Searches from `root`, and from `second` unless the first round reaches the noise level, until the gain of
@@ -477,20 +376,7 @@ impl Search<'_> {
             .candidates()
             .filter(|spec| hides(spec) && spec.channel.is_none());
         let possible = specs.filter(|spec| screen.pointless(spec).is_none());
-        possible.map(|spec| {
-            let term = Term::Effect {
-                spec,
-                parameters: spec.parameters.iter().map(|p| p.starts[0]).collect(),
-                grading: model.grading,
-                reference: None,
-            };
-            Proposal {
-                terms: vec![term],
-                coefficients: vec![Vec::new()],
-                left: 1.0,
-                score: 0.0,
-            }
-        })
+        possible.map(|spec| Proposal::unrated(spec, model))
     }
 
     /// Fits every proposal for a few iterations, and the best of them in full: `width` times the usual
@@ -708,48 +594,4 @@ fn least_of(all: &[Hypothesis], wanted: impl Fn(&usize) -> bool) -> Option<usize
     (0..all.len())
         .filter(wanted)
         .min_by(|a, b| all[*a].score().total_cmp(&all[*b].score()))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::data::{Record, Use};
-    use crate::model::Delay;
-    use crate::terms::Bench;
-    use model_core::effects::{ConstantDelay, spec};
-    use model_core::recursion::Grading;
-
-    /// A motor whose driver has a dead zone. The base without the curve of the input has six times its gain, and diverges
-    /// with the curve.
-    #[test]
-    fn a_base_that_diverges_with_a_kept_effect_gives_way_to_the_given_one() {
-        let (mut y, mut speed, mut random, mut level) = (Vec::new(), 0.0, 11_u32, 0.0);
-        let u: Vec<f64> = (0..2800)
-            .map(|k| {
-                if k % 60 == 0 {
-                    random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-                    level = [0.0, 0.24, 0.39, 0.55, 0.71, 1.0][(random >> 16) as usize % 6];
-                }
-                level
-            })
-            .collect();
-        for u in &u {
-            y.push(speed);
-            speed += ((u - 0.15_f64).max(0.0) / 0.85 - speed) / 12.0;
-        }
-        let record = Record::new("motor", Use::Identify, 0.001, u, y);
-        let mut given = Model {
-            a: vec![0.9166],
-            b: vec![0.01425],
-            grading: Grading::Interpolated,
-            delay: Delay::of::<ConstantDelay<f64>>(&[0.0], vec![1.0], true),
-            ..Model::default()
-        };
-        let curve = spec("input-nonlinearity").expect("in the catalogue");
-        given.add(curve, &[10.0, -5.19], None);
-        let bench = Bench::of(&given, &[record]).expect("a record to learn from");
-        let never = AtomicBool::new(false);
-        let root = Search::silent(&bench.judge, 0, &never).root(&bench.given, false);
-        assert!(root.expect("stable").judged.rmse() < 0.05);
-    }
 }

@@ -117,7 +117,14 @@ impl Term {
         };
         let added = model.effects.iter().find(|added| added.name == spec.name);
         let values = added.map_or(&[][..], |added| &added.parameters);
+        let of = |name: &str| {
+            let index = spec.parameters.iter().position(|card| card.name == name)?;
+            values.get(index)
+        };
         values.iter().zip(spec.parameters).any(|(value, card)| {
+            if card.below.and_then(of).is_some_and(|other| value >= other) {
+                return true;
+            }
             let place = |x: f64| if card.is_logarithmic() { x.ln() } else { x };
             let (low, high) = (place(card.low), place(card.high));
             let near = RULES.bound * (high - low);
@@ -372,16 +379,20 @@ impl Term {
         model
     }
 
-    /// The term with the parameters that it has in `model`, as starting values.
+    /// The term with the parameters and the reference that it has in `model`, as starting values.
     #[must_use]
     pub(super) fn as_in(&self, model: &Model) -> Self {
         match self {
             Self::Path { spec, .. } | Self::Effect { spec, .. } => {
                 let added = model.effects.iter().find(|added| added.name == spec.name);
-                added.map_or_else(
-                    || self.clone(),
-                    |added| self.with_parameters(added.parameters.clone()),
-                )
+                let Some(added) = added else {
+                    return self.clone();
+                };
+                let mut term = self.with_parameters(added.parameters.clone());
+                if let Self::Effect { reference, .. } = &mut term {
+                    *reference = added.reference.or(*reference);
+                }
+                term
             }
             Self::Inertia(_) => second_lag_s(model).map_or_else(
                 || self.clone(),

@@ -55,6 +55,8 @@ pub struct Parameter {
     pub sign: Sign,
     /// Value of the parameter if a model file does not contain it; `None` for a required parameter.
     pub left_out: Option<f64>,
+    /// Name of a parameter of the same effect that is larger by the physics; `None` if there is none.
+    pub below: Option<&'static str>,
 }
 
 impl Parameter {
@@ -80,6 +82,7 @@ impl Parameter {
                 Sign::Either
             },
             left_out: None,
+            below: None,
         }
     }
 
@@ -97,6 +100,16 @@ impl Parameter {
     pub const fn stepwise(self) -> Self {
         Self {
             influence: Influence::Stepwise,
+            ..self
+        }
+    }
+
+    /// The parameter is smaller than `other` by the physics. A fit may cross this limit, so that it can reject the
+    /// physics.
+    #[must_use]
+    pub const fn below(self, other: &'static str) -> Self {
+        Self {
+            below: Some(other),
             ..self
         }
     }
@@ -163,6 +176,8 @@ pub enum StartValue {
     Number(f64),
     /// The quantile of y at this fraction.
     Quantile(f64),
+    /// The level at this fraction of the range between the 5 and 95 % quantiles of y.
+    Level(f64),
     /// The present delay plus this many samples.
     Delay(f64),
     /// A multiple of the flow's time constant.
@@ -187,6 +202,10 @@ impl StartValue {
             Self::Number(value) if parameter.unit == Unit::YPerSample => value * facts.y_per_sample,
             Self::Number(value) => value * parameter.unit.scale(facts.y, facts.time, facts.u),
             Self::Quantile(q) => facts.quantile(q),
+            Self::Level(share) => {
+                let [low, high] = [0.05, 0.95].map(|q| facts.quantile(q));
+                low + share * (high - low)
+            }
             Self::Delay(longer) => in_time(facts.delay + longer),
             Self::TimeConstants(times) => in_time(times * facts.time_constant / facts.period),
             Self::Records(times) => in_time(times * facts.record / facts.period),

@@ -1,7 +1,8 @@
 //! Hysteresis of attachment: an attached flow stays attached at a friction at which it would not attach.
 
 use crate::effect::{
-    Amplitude, Effect, Flow, Instant, Parameter, Physics, Place, Setting, Spec, Unit, take,
+    Amplitude, Effect, Flow, Instant, Parameter, Physics, Place, Setting, Spec, StartValue, Starts,
+    Unit, take,
 };
 use crate::real::Real;
 
@@ -39,6 +40,15 @@ impl<T: Real> Effect<T> for AttachmentHysteresis<T> {
     }
 }
 
+/// A starting point with thresholds at these levels of the records.
+const fn thresholds(upper: f64, lower: f64) -> [StartValue; 3] {
+    [
+        StartValue::Level(upper),
+        StartValue::Level(lower),
+        StartValue::Number(0.15),
+    ]
+}
+
 impl<T: Real> Physics<T> for AttachmentHysteresis<T> {
     const SPEC: Spec = Spec {
         name: "attachment-hysteresis",
@@ -48,10 +58,29 @@ impl<T: Real> Physics<T> for AttachmentHysteresis<T> {
         equation: "relay r switches 0→1 at s > θ_hi and 1→0 at s < θ_lo; g·r is added to the drive",
         parameters: &[
             Parameter::new("upper_threshold", Unit::Y, [-0.5, 2.0], &[0.4, 0.6, 0.8]).stepwise(),
-            Parameter::new("lower_threshold", Unit::Y, [-0.5, 2.0], &[0.15, 0.35]).stepwise(),
+            Parameter::new("lower_threshold", Unit::Y, [-0.5, 2.0], &[0.15, 0.35])
+                .stepwise()
+                .below("upper_threshold"),
             Parameter::new("gain", Unit::Y, [-2.0, 2.0], &[0.15]),
         ],
         amplitude: Some(Amplitude::new("gain", "an attachment hysteresis").linear()),
+        starts: Starts::Rows(&[
+            &thresholds(0.25, 0.1),
+            &thresholds(0.4, 0.1),
+            &thresholds(0.4, 0.25),
+            &thresholds(0.55, 0.1),
+            &thresholds(0.55, 0.25),
+            &thresholds(0.55, 0.4),
+            &thresholds(0.7, 0.1),
+            &thresholds(0.7, 0.25),
+            &thresholds(0.7, 0.4),
+            &thresholds(0.7, 0.55),
+            &thresholds(0.88, 0.1),
+            &thresholds(0.88, 0.25),
+            &thresholds(0.88, 0.4),
+            &thresholds(0.88, 0.55),
+            &thresholds(0.88, 0.7),
+        ]),
         source: "Greenblatt & Wygnanski, Prog. Aerosp. Sci. 36 (2000)",
         ..Spec::PLAIN
     };

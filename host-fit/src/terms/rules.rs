@@ -51,14 +51,11 @@ rules! {
     finished: usize = 4, "", "80 rigs of six families";
     /// A given structure with more terms than this is not used as a starting point.
     most_given: usize = 6, "terms", "judgement: each of them is tested for removal at the end";
-    /// Effects that are tried in place of another term.
-    in_its_place: usize = 3, "", "judgement: the true effect is first or second in the screening";
-    /// An effect is tried in place of another term if its predicted error is below this factor.
-    promising: f64 = 2.0, "times the error", "eight rigs: the error after a brief fit was at least 0.7 × the predicted one";
-    /// A replacement is refitted in full if its error after a few iterations is within this factor of the model's.
+    /// An effect is fitted further in place of base terms if its error after a brief fit is below this factor.
+    promising: f64 = 2.0, "times the error", "judgement: base terms that imitate the effect are still in the model";
+    /// An effect in place of base terms is refitted in full if its error after further iterations is within this factor of
+    /// the model's.
     in_reach: f64 = 1.2, "times the error", "judgement: a valve lag in place of a film lag has 1.15 times the error after the first iterations";
-    /// A base model replaces a second named effect if its penalised error is larger by at most this.
-    as_well: f64 = 0.01, "share of the rms error", "with a fixed delay a film lag and a second lag of the flow are the same model, and the second has one parameter more";
     /// Iterations of the brief fit of each proposal.
     brief: usize = 6, "iterations", "with fewer iterations, thresholds stay at their starting values";
     /// Number of starting points, the best ones, that are continued after half of the iterations.

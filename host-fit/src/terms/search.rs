@@ -143,7 +143,6 @@ impl Search<'_> {
         let end = best(&all, |_| true);
         let bare_end = best(&all, Hypothesis::is_bare);
         let mut found = self.pruned(all[end].clone(), &root);
-        // The best hypothesis without effects is determined before terms are exchanged for effects.
         let bare = if bare_end == end {
             found.clone()
         } else {
@@ -163,7 +162,6 @@ impl Search<'_> {
             }
             all.extend(anew);
         }
-        let found = self.exchanged(found, &root, effort);
         Found {
             root,
             best: found,

@@ -1,10 +1,15 @@
-//! Standard checks of a model: residual correlations with their 95 % bands, the residual spectrum, step responses, poles.
+//! Standard checks of a model: residual correlations with their 95 % bands, the residual spectrum, step responses, poles,
+//! frequency responses.
 
 mod correlation;
+mod frequency;
 mod response;
 mod spectrum;
 
 pub use correlation::{Correlation, correlations};
+pub use frequency::{
+    Estimate, FrequencyPoint, FrequencyResponse, estimated_response, frequency_response,
+};
 pub use response::{Pole, StepResponse, poles, step_response};
 pub use spectrum::{Spectrum, spectrum};
 

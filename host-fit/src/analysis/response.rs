@@ -33,30 +33,26 @@ pub struct Pole {
 const REACH: f64 = 6.0;
 /// Longest response, samples.
 const LONGEST: usize = 20_000;
+/// Changes of the command for a linearisation, fractions of a full jet. The responses to both are compared.
+const SMALL: [f64; 2] = [1e-4, 1e-3];
+/// Largest difference of the two responses per unit of the command, and largest change over the last quarter of a
+/// settled response; shares of the largest change of y.
+const SAME: f64 = 0.02;
+const SETTLED: f64 = 1e-3;
 
 /// The step response of `model` from rest and from steady blowing; none if a free run diverges or the model needs
 /// measured channels.
 #[must_use]
 pub fn step_response(model: &Model) -> Option<StepResponse> {
-    let period = model.sample_period_s;
-    if period.is_nan() || period <= 0.0 || !model.channels().is_empty() {
-        return None;
-    }
-    let constant = model.time_constant();
-    let slow = if constant.is_finite() { constant } else { 1.0 };
-    let reach = (REACH * slow / period) as usize + 2 * model.longest_delay();
-    let reach = reach.clamp(100, LONGEST);
+    let reach = reach(model)?;
     let rest = reach / 4;
-    let u: Vec<f64> = (0..rest + 2 * reach)
-        .map(|k| f64::from(u8::from((rest..rest + reach).contains(&k))))
-        .collect();
-    let y = model.run_free(&Signals::commanded(model, &u)).ok()?;
+    let y = run(model, &[(rest, 0.0), (reach, 1.0), (reach, 0.0)])?;
     let change = |from: usize, sign: f64| {
         let start = y.get(from.checked_sub(1)?).copied()?;
         let after = y.get(from..from + reach)?;
         let each = after.iter().enumerate();
         Some(
-            each.map(|(k, y)| (k as f64 * period, sign * (y - start)))
+            each.map(|(k, y)| (k as f64 * model.sample_period_s, sign * (y - start)))
                 .collect::<Vec<_>>(),
         )
     };
@@ -64,6 +60,67 @@ pub fn step_response(model: &Model) -> Option<StepResponse> {
         opening: change(rest, 1.0)?,
         closing: change(rest + reach, -1.0)?,
     })
+}
+
+/// The response of `model` to a small step of the command at a level of [`step_response`]: rest (`command` 0) or the
+/// steady blown state (`command` 1). Change of y per full jet, from the sample of the step on, until it has settled.
+///
+/// None as for [`step_response`], if y does not settle, or if the response is not proportional to a small step.
+pub(super) fn small_step(model: &Model, command: u8) -> Option<Vec<f64>> {
+    let level = f64::from(command);
+    let mut reach = reach(model)?;
+    loop {
+        let lead = [(reach / 4, 0.0), (reach, level)];
+        let held = run(model, &[lead[0], lead[1], (reach, level)])?;
+        let after = |size: f64| {
+            // Between 0 and 1: upwards from rest, downwards from the full jet.
+            let size = if command == 0 { size } else { -size };
+            let moved = run(model, &[lead[0], lead[1], (reach, level + size)])?;
+            let change = moved.iter().zip(&held).skip(reach / 4 + reach);
+            Some(
+                change
+                    .map(|(y, held)| (y - held) / size)
+                    .collect::<Vec<_>>(),
+            )
+        };
+        let [found, larger] = SMALL.map(after);
+        let (found, larger) = (found?, larger?);
+        let most = found.iter().fold(0.0, |most: f64, y| most.max(y.abs()));
+        let differ = found.iter().zip(&larger).map(|(a, b)| (a - b).abs());
+        if most <= 0.0 || differ.fold(0.0, f64::max) > SAME * most {
+            return None;
+        }
+        let end = found.last().copied()?;
+        let late = found.iter().skip(found.len() * 3 / 4);
+        if late.map(|y| (y - end).abs()).fold(0.0, f64::max) <= SETTLED * most {
+            return Some(found);
+        }
+        if reach == LONGEST {
+            return None;
+        }
+        reach = (2 * reach).min(LONGEST);
+    }
+}
+
+/// Length of a step response, samples; none if the model needs measured channels or has no sampling period.
+fn reach(model: &Model) -> Option<usize> {
+    let period = model.sample_period_s;
+    if period.is_nan() || period <= 0.0 || !model.channels().is_empty() {
+        return None;
+    }
+    let constant = model.time_constant();
+    let slow = if constant.is_finite() { constant } else { 1.0 };
+    let reach = (REACH * slow / period) as usize + 2 * model.longest_delay();
+    Some(reach.clamp(100, LONGEST))
+}
+
+/// The free run under a command with `steps`: samples, and fraction of a full jet. None if it diverges.
+fn run(model: &Model, steps: &[(usize, f64)]) -> Option<Vec<f64>> {
+    let each = steps.iter();
+    let u: Vec<f64> = each
+        .flat_map(|(samples, share)| std::iter::repeat_n(model.command.command(*share), *samples))
+        .collect();
+    model.run_free(&Signals::commanded(model, &u)).ok()
 }
 
 /// The `most` slowest poles with the command at 0 and at 1, one of each conjugate pair; poles of the bilinear
@@ -99,6 +156,7 @@ fn pole(command: u8, re: f64, im: f64, period: f64) -> Pole {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::{CommandRange, Delay};
 
     #[test]
     fn a_first_order_lag_has_its_pole_and_its_step_response() {
@@ -113,6 +171,29 @@ mod tests {
         assert_eq!(found.len(), 2, "{found:?}");
         assert!((found[0].time_constant_s - 0.1).abs() < 1e-9);
         assert_eq!((found[0].hz, found[0].damping), (0.0, 1.0));
+    }
+
+    #[test]
+    fn a_step_is_a_full_jet_in_the_unit_of_the_command() {
+        let unit = Model {
+            sample_period_s: 0.001,
+            state_lags: vec![1],
+            a: vec![0.99],
+            b: vec![0.01],
+            delay: Delay::Fixed { delays: vec![7] },
+            ..Model::default()
+        };
+        let volts = Model {
+            command: CommandRange {
+                off: 2.0,
+                full: 7.0,
+            },
+            ..unit.clone()
+        };
+        let found = step_response(&unit).unwrap();
+        assert_eq!(step_response(&volts).unwrap(), found);
+        let last = found.opening.last().unwrap().1;
+        assert!((last - 1.0).abs() < 0.01, "{last}");
     }
 
     #[test]

@@ -1,8 +1,10 @@
 //! Power spectral density of residuals.
 
 use super::Residuals;
-use realfft::RealFftPlanner;
+use realfft::num_complex::Complex;
+use realfft::{RealFftPlanner, RealToComplex};
 use std::f64::consts::TAU;
+use std::sync::Arc;
 
 /// One-sided power spectral densities, in the unit of y squared per Hz. Their integrals over frequency are mean squares.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -20,44 +22,77 @@ pub struct Spectrum {
 /// Longest segment, samples.
 const LONGEST: usize = 4096;
 
+/// Segments of records for Welch's estimates: a quarter of the shortest record (at most 4096 samples), half
+/// overlapping, Hann window.
+pub(super) struct Segments {
+    /// Length of a segment, samples; a power of two.
+    pub(super) length: usize,
+    window: Vec<f64>,
+    transform: Arc<dyn RealToComplex<f64>>,
+}
+
+impl Segments {
+    /// The segments of `residuals`; none if the records are too short or the sampling period is unknown.
+    pub(super) fn of(residuals: &Residuals) -> Option<Self> {
+        let shortest = residuals.e.iter().map(Vec::len).min().unwrap_or(0);
+        let length = (shortest / 4).min(LONGEST);
+        if length < 32 || residuals.period_s.is_nan() || residuals.period_s <= 0.0 {
+            return None;
+        }
+        let length = 1 << length.ilog2();
+        Some(Self {
+            length,
+            window: (0..length)
+                .map(|k| 0.5 - 0.5 * (TAU * k as f64 / length as f64).cos())
+                .collect(),
+            transform: RealFftPlanner::new().plan_fft_forward(length),
+        })
+    }
+
+    /// Σ w², the energy of the window.
+    fn weight(&self) -> f64 {
+        self.window.iter().map(|w| w * w).sum()
+    }
+
+    /// The transforms of the segments of `signal`, each about its mean, from frequency 0 to half the sampling rate.
+    pub(super) fn lines<'a>(
+        &'a self,
+        signal: &'a [f64],
+    ) -> impl Iterator<Item = Vec<Complex<f64>>> + 'a {
+        let starts = (0..=signal.len().saturating_sub(self.length)).step_by(self.length / 2);
+        let parts = starts.filter_map(|start| signal.get(start..start + self.length));
+        parts.map(|part| {
+            let mean = part.iter().sum::<f64>() / self.length as f64;
+            let mut input: Vec<f64> = part
+                .iter()
+                .zip(&self.window)
+                .map(|(v, w)| (v - mean) * w)
+                .collect();
+            let mut lines = self.transform.make_output_vec();
+            // Cannot fail: the transform was planned for this length.
+            let _ = self.transform.process(&mut input, &mut lines);
+            lines
+        })
+    }
+}
+
 /// Welch's estimate: segments of a quarter of the shortest record (at most 4096 samples), half overlapping, Hann window.
 #[must_use]
 pub fn spectrum(residuals: &Residuals) -> Spectrum {
-    let shortest = residuals.e.iter().map(Vec::len).min().unwrap_or(0);
-    let length = (shortest / 4).min(LONGEST);
-    if length < 32 || residuals.period_s.is_nan() || residuals.period_s <= 0.0 {
+    let Some(segments) = Segments::of(residuals) else {
         return Spectrum::default();
-    }
-    let length = 1 << length.ilog2();
-    let window: Vec<f64> = (0..length)
-        .map(|k| 0.5 - 0.5 * (TAU * k as f64 / length as f64).cos())
-        .collect();
-    let weight: f64 = window.iter().map(|w| w * w).sum();
-    let transform = RealFftPlanner::new().plan_fft_forward(length);
+    };
+    let (length, weight) = (segments.length, segments.weight());
     let density = |signals: &[Vec<f64>]| {
         let mut sum = vec![0.0; length / 2 + 1];
-        let mut segments = 0.0;
-        for signal in signals {
-            for start in (0..=signal.len().saturating_sub(length)).step_by(length / 2) {
-                let Some(part) = signal.get(start..start + length) else {
-                    continue;
-                };
-                let mean = part.iter().sum::<f64>() / length as f64;
-                let mut input: Vec<f64> = part
-                    .iter()
-                    .zip(&window)
-                    .map(|(v, w)| (v - mean) * w)
-                    .collect();
-                let mut lines = transform.make_output_vec();
-                // Cannot fail: the transform was planned for this length.
-                let _ = transform.process(&mut input, &mut lines);
-                for (sum, line) in sum.iter_mut().zip(&lines) {
-                    *sum += line.norm_sqr();
-                }
-                segments += 1.0;
+        let mut count = 0.0;
+        for lines in signals.iter().flat_map(|signal| segments.lines(signal)) {
+            for (sum, line) in sum.iter_mut().zip(&lines) {
+                *sum += line.norm_sqr();
             }
+            count += 1.0;
         }
-        let scale = 2.0 * residuals.period_s / (weight * f64::max(segments, 1.0));
+        let scale = 2.0 * residuals.period_s / (weight * f64::max(count, 1.0));
         // The mean (frequency 0) is left out.
         sum.into_iter().skip(1).map(|s| s * scale).collect()
     };

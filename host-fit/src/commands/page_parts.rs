@@ -1,12 +1,15 @@
 //! Parts that several pages share: the answer, the interval of largest error, the standard residual tests.
 
-use host_fit::analysis::{Residuals, correlations, poles, spectrum, step_response};
+use host_fit::analysis::{
+    Estimate, FrequencyPoint, FrequencyResponse, Residuals, correlations, estimated_response,
+    frequency_response, poles, spectrum, step_response,
+};
 use host_fit::data::{Record, Use};
 use host_fit::indicators::ErrorKind;
 use host_fit::model::Model;
 use host_fit::picture::{
-    Column, LabelledRun, Line, LinePlot, Overlay, Picture, Report, Tone, lines, overlay,
-    significant,
+    Column, FrequencyCurve, FrequencyPlot, LabelledRun, Line, LinePlot, Overlay, Picture, Report,
+    Tone, frequency, lines, overlay, significant,
 };
 use host_fit::steps::{self, Answer};
 
@@ -163,7 +166,7 @@ pub(super) fn measured(record: &Record) -> Overlay<'_> {
 /// A picture with its caption.
 pub(crate) type Figure = (Picture, String);
 
-/// Residual correlations, residual spectrum, step responses and poles of each model.
+/// Residual correlations, residual spectrum, step responses, poles and frequency responses of each model.
 pub(crate) fn checks(report: &mut Report, records: &[Record], runs: &[Run<'_>]) {
     report.section("Residual tests");
     report.columns();
@@ -172,15 +175,25 @@ pub(crate) fn checks(report: &mut Report, records: &[Record], runs: &[Run<'_>]) 
     }
     report.end_columns();
     let rows = pole_rows(runs);
-    if rows.is_empty() {
+    if !rows.is_empty() {
+        report.subsection("Poles");
+        let columns = POLES.map(|(name, is_number)| match is_number {
+            true => Column::Number(name),
+            false => Column::Text(name),
+        });
+        report.table(POLES_ARE, &columns, &rows);
+    }
+    let figures = frequency_figures(records, runs);
+    if figures.is_empty() {
         return;
     }
-    report.subsection("Poles");
-    let columns = POLES.map(|(name, is_number)| match is_number {
-        true => Column::Number(name),
-        false => Column::Text(name),
-    });
-    report.table(POLES_ARE, &columns, &rows);
+    report.fold("Frequency response");
+    report.columns();
+    for (picture, caption) in figures {
+        report.figure(&picture, &caption);
+    }
+    report.end_columns();
+    report.end_fold();
 }
 
 /// The pictures of [`checks`].
@@ -333,6 +346,115 @@ fn responses(runs: &[Run<'_>]) -> Option<Figure> {
         "The command opens from rest (0 → 1), and closes from the steady state (1 → 0, sign reversed). For a \
          linear plant the two responses are equal."
             .to_owned(),
+    ))
+}
+
+/// The frequency responses of each model: over the records with the measured one, and at the two levels of the step response.
+pub(crate) fn frequency_figures(records: &[Record], runs: &[Run<'_>]) -> Vec<Figure> {
+    let seconds = records.iter().map(|r| r.len() as f64 * r.sample_period_s);
+    let longest_s = seconds.fold(0.0, f64::max);
+    let levels: Vec<[Option<FrequencyResponse>; 2]> = runs
+        .iter()
+        .map(|run| [0, 1].map(|command| frequency_response(run.model, command, longest_s)))
+        .collect();
+    let over = over_records(records, runs, &levels);
+    over.into_iter().chain(at_levels(runs, &levels)).collect()
+}
+
+/// The measured frequency response, and that of each model's free run, estimated in the same way.
+fn over_records(
+    records: &[Record],
+    runs: &[Run<'_>],
+    levels: &[[Option<FrequencyResponse>; 2]],
+) -> Option<Figure> {
+    let each: Vec<Vec<Estimate>> = runs
+        .iter()
+        .zip(levels)
+        .map(|(run, levels)| {
+            let known = levels.iter().flatten().next();
+            let dead_time = known.map_or(0, |response| response.dead_time);
+            let range = run.model.command;
+            let residuals = Residuals::of(records, run.runs);
+            estimated_response(&residuals, range.full - range.off, dead_time)
+        })
+        .collect();
+    let measured = each.last().filter(|estimates| !estimates.is_empty())?;
+    let points: Vec<Vec<FrequencyPoint>> = each
+        .iter()
+        .map(|estimates| estimates.iter().map(|estimate| estimate.run).collect())
+        .collect();
+    let curves: Vec<FrequencyCurve<'_>> = runs
+        .iter()
+        .zip(&points)
+        .enumerate()
+        .map(|(colour, (run, points))| FrequencyCurve {
+            label: run.label,
+            points,
+            colour,
+            dashed: false,
+        })
+        .collect();
+    let kind = match records.iter().any(|r| r.role == Use::Validate) {
+        true => "validation records",
+        false => "records",
+    };
+    Some((
+        frequency(&FrequencyPlot {
+            title: "Frequency response over the records",
+            curves: &curves,
+            measured,
+        }),
+        format!(
+            "Cross-spectrum of u and y over the spectrum of u, in twelve bands per decade, from the {kind}; y per full jet. The \
+             curves are the same estimate from the free runs. Only bands with significant coherence (5 % level). The limits contain \
+             measurement noise and the part of y that is not linear in u; they hold for each band alone. If a curve leaves them, the \
+             model lacks dynamics there."
+        ),
+    ))
+}
+
+/// The frequency response of each model, linearised at the two levels of the step response.
+fn at_levels(runs: &[Run<'_>], levels: &[[Option<FrequencyResponse>; 2]]) -> Option<Figure> {
+    let labels: Vec<[String; 2]> = runs
+        .iter()
+        .map(|run| {
+            [
+                format!("{}: about off", run.label),
+                format!("{}: about on", run.label),
+            ]
+        })
+        .collect();
+    let mut curves = Vec::new();
+    for (colour, (levels, labels)) in levels.iter().zip(&labels).enumerate() {
+        for ((response, label), dashed) in levels.iter().zip(labels).zip([false, true]) {
+            let Some(response) = response else { continue };
+            curves.push(FrequencyCurve {
+                label,
+                points: &response.points,
+                colour,
+                dashed,
+            });
+        }
+    }
+    if curves.is_empty() {
+        return None;
+    }
+    let mut caption = "Each model with its effects and its dead time, linearised at rest (command off) and in the steady state with \
+                       the command on; y per full jet, for small changes of the duty. No band: a model file has no covariance of \
+                       its coefficients."
+        .to_owned();
+    if levels.iter().flatten().any(Option::is_none) {
+        caption.push_str(
+            " Not drawn: a level at which the model is not linear for small changes of the command or does not settle.",
+        );
+    }
+    Some((
+        frequency(&FrequencyPlot {
+            title: "Frequency response at two levels",
+            curves: &curves,
+            measured: &[],
+        }),
+        caption,
     ))
 }
 

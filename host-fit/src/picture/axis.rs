@@ -12,6 +12,8 @@ pub(super) struct Axis {
     hi: f64,
     /// Values are logarithms to base 10; tick labels show the original values.
     decades: bool,
+    /// Values are angles in degrees: ticks divide a turn.
+    degrees: bool,
 }
 
 /// A tick of an axis.
@@ -55,6 +57,15 @@ impl Axis {
             lo,
             hi,
             decades: false,
+            degrees: false,
+        }
+    }
+
+    /// Axis of an angle in degrees over `range`.
+    pub(super) fn degrees(range: (f64, f64)) -> Self {
+        Self {
+            degrees: true,
+            ..Self::linear(Some(range))
         }
     }
 
@@ -95,11 +106,12 @@ impl Axis {
         }
         let rough = (self.hi - self.lo) / count.clamp(1, 50) as f64;
         let decade = 10f64.powi(rough.log10().floor() as i32);
-        let step = [1.0, 2.0, 5.0, 10.0]
-            .into_iter()
-            .map(|m| m * decade)
-            .find(|step| *step >= rough * 0.75)
-            .unwrap_or(10.0 * decade);
+        let round = [1.0, 2.0, 5.0, 10.0].map(|m| m * decade);
+        let divides_a_turn = [15.0, 30.0, 45.0, 90.0, 180.0, 360.0];
+        let angle = self.degrees && (15.0..=360.0).contains(&rough);
+        let steps: &[f64] = if angle { &divides_a_turn } else { &round };
+        let wide = steps.iter().find(|step| **step >= rough * 0.75);
+        let step = wide.copied().unwrap_or(10.0 * decade);
         let first = (self.lo / step - 1e-6).ceil();
         let last = (self.hi / step + 1e-6).floor();
         let values: Vec<f64> = (0..=60)
@@ -186,6 +198,14 @@ mod tests {
         assert_eq!(
             labels(Axis::decades(Some((-1.2, 2.5))), 5),
             ["0.1", "1", "10", "100"]
+        );
+    }
+
+    #[test]
+    fn angles_are_labelled_at_parts_of_a_turn() {
+        assert_eq!(
+            labels(Axis::degrees((-400.0, 10.0)), 5),
+            ["−360", "−270", "−180", "−90", "0"]
         );
     }
 

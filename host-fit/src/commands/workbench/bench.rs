@@ -19,7 +19,8 @@ use super::request::Line;
 use crate::commands::demo::bundled_ramp;
 use crate::commands::drawings::step_by_step;
 use crate::commands::page_parts::{
-    POLES, POLES_ARE, Run, check_figures, pole_rows, stretch_figure, worst_stretch,
+    POLES, POLES_ARE, Run, check_figures, frequency_figures, pole_rows, stretch_figure,
+    worst_stretch,
 };
 use crate::commands::words::{describe, score_rows};
 use crate::commands::{page, paragraph};
@@ -359,6 +360,7 @@ impl ModelBench {
         let checks: Vec<Value> = match compared.run {
             Ok(_) => check_figures(&records, &tested)
                 .into_iter()
+                .chain(frequency_figures(&records, &tested))
                 .map(drawn)
                 .collect(),
             Err(_) => Vec::new(),

@@ -1,0 +1,270 @@
+//! Frequency responses (Bode diagram): magnitude above phase over one logarithmic frequency axis.
+
+use super::axis::{Axis, extent};
+use super::canvas::{Canvas, Ink, MARGIN, Picture, draw};
+use super::legend::{Swatch, heading, nothing};
+use super::palette::{INK, series};
+use super::panel::{FOOT, Panel, left_edge};
+use crate::analysis::{Estimate, FrequencyPoint};
+
+/// The frequency response of one model.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct FrequencyCurve<'a> {
+    /// Label in the legend.
+    pub label: &'a str,
+    /// Points on ascending frequencies.
+    pub points: &'a [FrequencyPoint],
+    /// Colour index of the model.
+    pub colour: usize,
+    /// Dashed, to distinguish two curves of one model.
+    pub dashed: bool,
+}
+
+/// Contents of [`frequency`].
+#[derive(Clone, Copy, Debug, Default)]
+pub struct FrequencyPlot<'a> {
+    /// Title; empty for none.
+    pub title: &'a str,
+    /// Curves of models.
+    pub curves: &'a [FrequencyCurve<'a>],
+    /// Estimates from records, drawn as points with their 95 % limits.
+    pub measured: &'a [Estimate],
+}
+
+/// Largest number of points drawn of a curve.
+const MOST_POINTS: usize = 600;
+/// Range of the magnitude below its largest value, dB.
+const DEPTH: f64 = 80.0;
+/// Range of the phase below its largest value, degrees.
+const TURN: f64 = 720.0;
+/// Height of a panel and distance between the two, pixels.
+const HEIGHT: f64 = 190.0;
+const BETWEEN: f64 = 20.0;
+
+/// A point of one panel with its limits: logarithm of the frequency, value, lower and upper limit.
+type Measured = (f64, f64, [f64; 2]);
+
+/// Draws magnitude and phase of frequency responses. Returns SVG. More than 80 dB below the largest magnitude, and more than
+/// 720° below the largest phase, nothing is drawn.
+#[must_use]
+pub fn frequency(plot: &FrequencyPlot<'_>) -> Picture {
+    let description = format!("{}: magnitude and phase against frequency", plot.title);
+    draw(&description, |canvas| {
+        let within = |of: &dyn Fn(&FrequencyPoint) -> f64| -> Vec<Vec<(f64, f64)>> {
+            let each = plot.curves.iter();
+            each.map(|curve| {
+                let thin = curve.points.len().div_ceil(MOST_POINTS).max(1);
+                let points = curve.points.iter().step_by(thin);
+                points.map(|point| (point.hz.log10(), of(point))).collect()
+            })
+            .collect()
+        };
+        let gains = within(&|point| decibels(point.gain));
+        let phases = within(&|point| point.phase);
+        let measured = plot.measured.iter();
+        let measured_gains: Vec<Measured> = measured
+            .clone()
+            .map(|e| {
+                (
+                    e.measured.hz.log10(),
+                    decibels(e.measured.gain),
+                    e.gain.map(decibels),
+                )
+            })
+            .collect();
+        let measured_phases: Vec<Measured> = measured
+            .map(|e| (e.measured.hz.log10(), e.measured.phase, e.phase))
+            .collect();
+        let x = gains.iter().flatten().map(|point| point.0);
+        let x = extent(x.chain(measured_gains.iter().map(|point| point.0)));
+        let panels = [
+            range(&gains, &measured_gains, DEPTH),
+            range(&phases, &measured_phases, TURN),
+        ];
+        let [Some(gain), Some(phase)] = panels else {
+            return nothing(canvas, plot.title, "There is nothing to draw.");
+        };
+        let mut entries: Vec<_> = plot
+            .curves
+            .iter()
+            .map(|curve| {
+                let swatch = match curve.dashed {
+                    true => Swatch::Dashes(series(curve.colour)),
+                    false => Swatch::Line(series(curve.colour)),
+                };
+                (swatch, curve.label.to_owned())
+            })
+            .collect();
+        if !plot.measured.is_empty() {
+            entries.push((Swatch::Dot(INK), "measured, with 95 % limits".to_owned()));
+        }
+        let top = heading(canvas, plot.title, &entries);
+        let axes = [
+            Axis::padded(Some(gain), 0.06),
+            Axis::degrees(Axis::padded(Some(phase), 0.06).ends()),
+        ];
+        let left = left_edge(&axes);
+        let width = canvas.width - left - MARGIN - 12.0;
+        let mut below = top;
+        let parts = [
+            (&gains, &measured_gains, gain.0, "magnitude (dB re 1 y)"),
+            (&phases, &measured_phases, phase.0, "phase (°)"),
+        ];
+        for (y, (curves, points, lowest, label)) in axes.into_iter().zip(parts) {
+            let panel = Panel {
+                left,
+                top: below,
+                width,
+                height: HEIGHT,
+                x: Axis::decades(x),
+                y,
+            };
+            panel.uprights(canvas);
+            panel.frame(canvas, label);
+            for (curve, points) in plot.curves.iter().zip(curves) {
+                draw_curve(canvas, &panel, curve, points, lowest);
+            }
+            for point in points.iter().filter(|point| point.1 >= lowest) {
+                draw_measured(canvas, &panel, point);
+            }
+            below = panel.bottom() + BETWEEN;
+            if label.starts_with("phase") {
+                panel.foot(canvas, "frequency (Hz)");
+            }
+        }
+        below - BETWEEN + FOOT
+    })
+}
+
+/// Lowest and highest value of a panel, at most `depth` apart. Limits count only as far as a tenth of `depth` beyond.
+fn range(curves: &[Vec<(f64, f64)>], measured: &[Measured], depth: f64) -> Option<(f64, f64)> {
+    let values = curves.iter().flatten().map(|point| point.1);
+    let (low, high) = extent(values.chain(measured.iter().map(|point| point.1)))?;
+    let limits = || measured.iter().flat_map(|point| point.2);
+    let (least, most) = extent(limits()).unwrap_or((low, high));
+    let beyond = 0.1 * depth;
+    let high = high.max(most.min(high + beyond));
+    let low = low.min(least.max(low - beyond));
+    Some((low.max(high - depth), high))
+}
+
+fn draw_curve(
+    canvas: &mut Canvas,
+    panel: &Panel,
+    curve: &FrequencyCurve<'_>,
+    points: &[(f64, f64)],
+    lowest: f64,
+) {
+    let ink = Ink::new(series(curve.colour), 2.0);
+    let shown = |(x, y): (f64, f64)| (x, if y >= lowest { y } else { f64::NAN });
+    let points = points.iter().copied().map(shown);
+    if !curve.dashed {
+        return panel.curve(canvas, points, ink);
+    }
+    let pixels: Vec<_> = points.map(|(x, y)| panel.point(x, y)).collect();
+    for piece in pixels.split(Option::is_none) {
+        let piece: Vec<(f64, f64)> = piece.iter().flatten().copied().collect();
+        canvas.dashes(&piece, ink, 6.0);
+    }
+}
+
+fn draw_measured(canvas: &mut Canvas, panel: &Panel, (x, y, limits): &Measured) {
+    let ink = Ink::new(INK, 1.25);
+    let [low, high] = limits.map(|limit| panel.point(*x, limit));
+    if let (Some(low), Some(high)) = (low, high) {
+        canvas.line(&[low, high], ink);
+    }
+    if let Some(at) = panel.point(*x, *y) {
+        canvas.dot(at, 2.5, ink, true);
+    }
+}
+
+/// A magnitude in dB re 1 y; NaN for one that is not above 0.
+fn decibels(gain: f64) -> f64 {
+    if gain > 0.0 {
+        20.0 * gain.log10()
+    } else {
+        f64::NAN
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::picture::testing::{absurd_series, check, words};
+
+    #[test]
+    fn both_panels_have_their_units_and_every_curve_is_in_the_legend() {
+        let points = [0.1, 1.0, 10.0, 100.0].map(|hz| FrequencyPoint {
+            hz,
+            gain: 1.0 / (1.0 + hz),
+            phase: -36.0 * hz,
+        });
+        let curve = |label, dashed| FrequencyCurve {
+            label,
+            points: &points,
+            colour: 1,
+            dashed,
+        };
+        let svg = frequency(&FrequencyPlot {
+            title: "Frequency response",
+            curves: &[curve("about off", false), curve("about on", true)],
+            measured: &[Estimate {
+                measured: points[1],
+                gain: [0.4, 0.6],
+                phase: [-40.0, -30.0],
+                run: points[1],
+            }],
+        });
+        check(&svg);
+        let said = words(&svg);
+        for word in [
+            "about off",
+            "about on",
+            "95 % limits",
+            "frequency (Hz)",
+            "magnitude (dB re 1 y)",
+            "phase (°)",
+            "−360",
+        ] {
+            assert!(said.contains(word), "{word} in {said}");
+        }
+        // The phase of the last point is 3600° below: the axis ends before.
+        assert!(!said.contains("−3600"), "{said}");
+    }
+
+    #[test]
+    fn absurd_input_never_panics() {
+        for values in absurd_series() {
+            let points: Vec<_> = values
+                .iter()
+                .map(|v| FrequencyPoint {
+                    hz: *v,
+                    gain: *v,
+                    phase: -*v,
+                })
+                .collect();
+            let measured: Vec<_> = points
+                .iter()
+                .take(500)
+                .map(|point| Estimate {
+                    measured: *point,
+                    gain: [f64::NAN, point.gain],
+                    phase: [point.phase, f64::INFINITY],
+                    run: *point,
+                })
+                .collect();
+            for dashed in [false, true] {
+                check(&frequency(&FrequencyPlot {
+                    title: "",
+                    curves: &[FrequencyCurve {
+                        points: &points,
+                        dashed,
+                        ..FrequencyCurve::default()
+                    }],
+                    measured: &measured,
+                }));
+            }
+        }
+    }
+}

@@ -410,8 +410,14 @@ footer dl{display:grid;grid-template-columns:max-content 1fr;gap:2px 14px;margin
 footer dd{margin:0;overflow-wrap:anywhere}\
 @media(max-width:600px){main{padding:16px 12px 40px}\
 .verdict{padding:10px 12px}.verdict dl{display:block}.verdict dd{margin:0 0 .5em}}\
-@media print{main,.report{max-width:none;padding:0}.listed{display:block}.columns{grid-template-columns:1fr 1fr}figure svg{max-width:600px}.fold>summary{border:0;padding:0}body{font-size:11pt}nav{display:none}\
-figure,.verdict,tr{break-inside:avoid}h2,h3{break-after:avoid}.table,pre{overflow:visible}pre{white-space:pre-wrap}}\
+@page{margin:14mm 13mm}\
+@media print{main,.report{max-width:none;padding:0}.listed,.columns{display:block}\
+.cell{display:contents}.columns figure{display:inline-block;width:49%;vertical-align:top;margin:6px 0}\
+figure svg{max-width:520px}.columns figure svg{width:auto;max-width:100%;max-height:98mm}.fold>summary{border:0;padding:0}body{font-size:10pt}\
+table,.caption,figcaption{font-size:9pt}th,td{padding-top:3px;padding-bottom:3px}h2{margin-top:1.4em}\
+p,ul,figcaption{max-width:none}.columns figcaption{padding-right:10px}\
+nav{display:none}figure:has(>.save){padding-bottom:0}\
+figure,.verdict,tr{break-inside:avoid}h2,h3,h2+p,.caption,summary{break-after:avoid}.table,pre{overflow:visible}pre{white-space:pre-wrap}}\
 ";
 
 const LIGHT: &str = "\

@@ -254,7 +254,7 @@ export class Chart {
       },
       axes: [
         { ...axis, values, space: narrow ? 60 : 80, show: true, size: foot ? 26 : 8, ...(foot ? { label: "time since the record's start (s)", labelSize: 20 } : { values: () => [] }) },
-        { ...axis, values, space: kind === "r" ? 28 : 36, label, labelSize: 20, size: narrow ? 50 : 58 },
+        { ...axis, values, space: kind === "r" ? 28 : 36, label, labelSize: 20, size: narrow ? 56 : 58 },
       ],
       series: [{}, ...layers.map((layer) => ({ label: layer.label, stroke: layer.stroke, width: layer.width, dash: layer.dash, points: { show: false }, spanGaps: false }))],
       hooks: {

@@ -203,7 +203,11 @@ function drawAnswers(s) {
   const cards = [law?.answer, discovery?.answer, diagnosis?.answer, made?.answer].filter((a) => a !== undefined && a !== null);
   section("answer", cards.length > 0);
   place("answer").replaceChildren(...cards.map(verdict));
-  // The plots that there are.
+  listPlots();
+}
+
+/** The plots that there are, as links above them. */
+function listPlots() {
   const plots = [...document.querySelectorAll("#middle > section:not([hidden])")];
   place("plots").hidden = plots.length < 2;
   place("plots").replaceChildren(el("ul", {}, ...plots.map((plot) =>
@@ -323,6 +327,7 @@ async function records() {
   if (key !== wanted) return;
   shown = key;
   section("records", true);
+  listPlots();
   group?.destroy();
   place("g1").replaceChildren();
   // Names begin with the model's number; of a search, the next one's.

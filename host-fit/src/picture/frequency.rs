@@ -34,7 +34,7 @@ pub struct FrequencyPlot<'a> {
 /// Largest number of points drawn of a curve.
 const MOST_POINTS: usize = 600;
 /// Range of the magnitude below its largest value, dB.
-const DEPTH: f64 = 80.0;
+const DEPTH: f64 = 60.0;
 /// Range of the phase below its largest value, degrees.
 const TURN: f64 = 720.0;
 /// Height of a panel and distance between the two, pixels.
@@ -44,8 +44,8 @@ const BETWEEN: f64 = 20.0;
 /// A point of one panel with its limits: logarithm of the frequency, value, lower and upper limit.
 type Measured = (f64, f64, [f64; 2]);
 
-/// Draws magnitude and phase of frequency responses. Returns SVG. More than 80 dB below the largest magnitude, and more than
-/// 720° below the largest phase, nothing is drawn.
+/// Draws magnitude and phase of frequency responses. Returns SVG. More than 60 dB below the largest magnitude, and more than
+/// 720° below the largest phase, nothing is drawn: so small a response is rounding and leakage of the window.
 #[must_use]
 pub fn frequency(plot: &FrequencyPlot<'_>) -> Picture {
     let description = format!("{}: magnitude and phase against frequency", plot.title);
@@ -60,28 +60,28 @@ pub fn frequency(plot: &FrequencyPlot<'_>) -> Picture {
             .collect()
         };
         let gains = within(&|point| decibels(point.gain));
-        let phases = within(&|point| point.phase);
-        let measured = plot.measured.iter();
-        let measured_gains: Vec<Measured> = measured
-            .clone()
+        let measured_gains: Vec<Measured> = (plot.measured.iter())
             .map(|e| {
-                (
-                    e.measured.hz.log10(),
-                    decibels(e.measured.gain),
-                    e.gain.map(decibels),
-                )
+                let limits = e.gain.map(decibels);
+                (e.measured.hz.log10(), decibels(e.measured.gain), limits)
             })
             .collect();
-        let measured_phases: Vec<Measured> = measured
+        let Some(gain) = range(&gains, &measured_gains, DEPTH) else {
+            return nothing(canvas, plot.title, "There is nothing to draw.");
+        };
+        // A phase is drawn where its magnitude is.
+        let phase = |point: &FrequencyPoint| match decibels(point.gain) >= gain.0 {
+            true => point.phase,
+            false => f64::NAN,
+        };
+        let phases = within(&phase);
+        let measured_phases: Vec<Measured> = (plot.measured.iter())
+            .filter(|e| decibels(e.measured.gain) >= gain.0)
             .map(|e| (e.measured.hz.log10(), e.measured.phase, e.phase))
             .collect();
         let x = gains.iter().flatten().map(|point| point.0);
         let x = extent(x.chain(measured_gains.iter().map(|point| point.0)));
-        let panels = [
-            range(&gains, &measured_gains, DEPTH),
-            range(&phases, &measured_phases, TURN),
-        ];
-        let [Some(gain), Some(phase)] = panels else {
+        let Some(phase) = range(&phases, &measured_phases, TURN) else {
             return nothing(canvas, plot.title, "There is nothing to draw.");
         };
         let mut entries: Vec<_> = plot

@@ -413,7 +413,7 @@ footer dd{margin:0;overflow-wrap:anywhere}\
 @page{margin:14mm 13mm}\
 @media print{main,.report{max-width:none;padding:0}.listed,.columns{display:block}\
 .cell{display:contents}.columns figure{display:inline-block;width:49%;vertical-align:top;margin:6px 0}\
-figure svg{max-width:520px}.columns figure svg{width:auto;max-width:100%;max-height:98mm}.fold>summary{border:0;padding:0}body{font-size:10pt}\
+figure svg{width:auto;max-width:520px;max-height:158mm}.columns figure svg{max-width:100%;max-height:98mm}.fold>summary{border:0;padding:0}body{font-size:10pt}\
 table,.caption,figcaption{font-size:9pt}th,td{padding-top:3px;padding-bottom:3px}h2{margin-top:1.4em}\
 p,ul,figcaption{max-width:none}.columns figcaption{padding-right:10px}\
 nav{display:none}figure:has(>.save){padding-bottom:0}\

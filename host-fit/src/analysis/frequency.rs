@@ -19,6 +19,14 @@ pub struct FrequencyPoint {
     pub phase: f64,
 }
 
+impl FrequencyPoint {
+    /// Frequency (Hz), magnitude (y) and phase (degrees).
+    #[must_use]
+    pub fn values(&self) -> [f64; 3] {
+        [self.hz, self.gain, self.phase]
+    }
+}
+
 /// Frequency response of a model, linearised about a constant command.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FrequencyResponse {

@@ -8,8 +8,8 @@ use host_fit::data::{Record, Use};
 use host_fit::indicators::ErrorKind;
 use host_fit::model::Model;
 use host_fit::picture::{
-    Column, FrequencyCurve, FrequencyPlot, LabelledRun, Line, LinePlot, Overlay, Picture, Report,
-    Tone, frequency, lines, overlay, significant,
+    Column, FrequencyCurve, FrequencyPlot, LabelledRun, Line, LinePlot, MeasuredResponse, Overlay,
+    Picture, Report, Tone, frequency, lines, overlay, significant,
 };
 use host_fit::steps::{self, Answer};
 
@@ -379,9 +379,17 @@ fn over_records(
         })
         .collect();
     let measured = each.last().filter(|estimates| !estimates.is_empty())?;
-    let points: Vec<Vec<FrequencyPoint>> = each
+    let measured: Vec<MeasuredResponse> = measured
         .iter()
-        .map(|estimates| estimates.iter().map(|estimate| estimate.run).collect())
+        .map(|estimate| MeasuredResponse {
+            at: estimate.measured.values(),
+            gain: estimate.gain,
+            phase: estimate.phase,
+        })
+        .collect();
+    let points: Vec<Vec<[f64; 3]>> = each
+        .iter()
+        .map(|estimates| estimates.iter().map(|one| one.run.values()).collect())
         .collect();
     let curves: Vec<FrequencyCurve<'_>> = runs
         .iter()
@@ -402,7 +410,7 @@ fn over_records(
         frequency(&FrequencyPlot {
             title: "Frequency response over the records",
             curves: &curves,
-            measured,
+            measured: &measured,
         }),
         format!(
             "Cross-spectrum of u and y over the spectrum of u, in twelve bands per decade, from the {kind}; y per full jet. The \
@@ -424,13 +432,21 @@ fn at_levels(runs: &[Run<'_>], levels: &[[Option<FrequencyResponse>; 2]]) -> Opt
             ]
         })
         .collect();
+    let values = |response: &FrequencyResponse| -> Vec<[f64; 3]> {
+        let points = response.points.iter();
+        points.map(FrequencyPoint::values).collect()
+    };
+    let points: Vec<[Option<Vec<[f64; 3]>>; 2]> = levels
+        .iter()
+        .map(|levels| levels.each_ref().map(|level| level.as_ref().map(values)))
+        .collect();
     let mut curves = Vec::new();
-    for (colour, (levels, labels)) in levels.iter().zip(&labels).enumerate() {
-        for ((response, label), dashed) in levels.iter().zip(labels).zip([false, true]) {
-            let Some(response) = response else { continue };
+    for (colour, (points, labels)) in points.iter().zip(&labels).enumerate() {
+        for ((points, label), dashed) in points.iter().zip(labels).zip([false, true]) {
+            let Some(points) = points else { continue };
             curves.push(FrequencyCurve {
                 label,
-                points: &response.points,
+                points,
                 colour,
                 dashed,
             });

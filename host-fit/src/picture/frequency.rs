@@ -5,19 +5,29 @@ use super::canvas::{Canvas, Ink, MARGIN, Picture, draw};
 use super::legend::{Swatch, heading, nothing};
 use super::palette::{INK, series};
 use super::panel::{FOOT, Panel, left_edge};
-use crate::analysis::{Estimate, FrequencyPoint};
 
 /// The frequency response of one model.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct FrequencyCurve<'a> {
     /// Label in the legend.
     pub label: &'a str,
-    /// Points on ascending frequencies.
-    pub points: &'a [FrequencyPoint],
+    /// Frequency (Hz), magnitude (y) and phase (degrees) of points on ascending frequencies.
+    pub points: &'a [[f64; 3]],
     /// Colour index of the model.
     pub colour: usize,
     /// Dashed, to distinguish two curves of one model.
     pub dashed: bool,
+}
+
+/// A point of a frequency response that was estimated from records.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MeasuredResponse {
+    /// Frequency (Hz), magnitude (y) and phase (degrees).
+    pub at: [f64; 3],
+    /// 95 % limits of the magnitude, y.
+    pub gain: [f64; 2],
+    /// 95 % limits of the phase, degrees.
+    pub phase: [f64; 2],
 }
 
 /// Contents of [`frequency`].
@@ -28,7 +38,7 @@ pub struct FrequencyPlot<'a> {
     /// Curves of models.
     pub curves: &'a [FrequencyCurve<'a>],
     /// Estimates from records, drawn as points with their 95 % limits.
-    pub measured: &'a [Estimate],
+    pub measured: &'a [MeasuredResponse],
 }
 
 /// Largest number of points drawn of a curve.
@@ -50,34 +60,34 @@ type Measured = (f64, f64, [f64; 2]);
 pub fn frequency(plot: &FrequencyPlot<'_>) -> Picture {
     let description = format!("{}: magnitude and phase against frequency", plot.title);
     draw(&description, |canvas| {
-        let within = |of: &dyn Fn(&FrequencyPoint) -> f64| -> Vec<Vec<(f64, f64)>> {
+        let within = |of: &dyn Fn(&[f64; 3]) -> f64| -> Vec<Vec<(f64, f64)>> {
             let each = plot.curves.iter();
             each.map(|curve| {
                 let thin = curve.points.len().div_ceil(MOST_POINTS).max(1);
                 let points = curve.points.iter().step_by(thin);
-                points.map(|point| (point.hz.log10(), of(point))).collect()
+                points.map(|point| (point[0].log10(), of(point))).collect()
             })
             .collect()
         };
-        let gains = within(&|point| decibels(point.gain));
+        let gains = within(&|[_, gain, _]| decibels(*gain));
         let measured_gains: Vec<Measured> = (plot.measured.iter())
             .map(|e| {
                 let limits = e.gain.map(decibels);
-                (e.measured.hz.log10(), decibels(e.measured.gain), limits)
+                (e.at[0].log10(), decibels(e.at[1]), limits)
             })
             .collect();
         let Some(gain) = range(&gains, &measured_gains, DEPTH) else {
             return nothing(canvas, plot.title, "There is nothing to draw.");
         };
         // A phase is drawn where its magnitude is.
-        let phase = |point: &FrequencyPoint| match decibels(point.gain) >= gain.0 {
-            true => point.phase,
+        let phase = |[_, magnitude, phase]: &[f64; 3]| match decibels(*magnitude) >= gain.0 {
+            true => *phase,
             false => f64::NAN,
         };
         let phases = within(&phase);
         let measured_phases: Vec<Measured> = (plot.measured.iter())
-            .filter(|e| decibels(e.measured.gain) >= gain.0)
-            .map(|e| (e.measured.hz.log10(), e.measured.phase, e.phase))
+            .filter(|e| decibels(e.at[1]) >= gain.0)
+            .map(|e| (e.at[0].log10(), e.at[2], e.phase))
             .collect();
         let x = gains.iter().flatten().map(|point| point.0);
         let x = extent(x.chain(measured_gains.iter().map(|point| point.0)));
@@ -195,11 +205,7 @@ mod tests {
 
     #[test]
     fn both_panels_have_their_units_and_every_curve_is_in_the_legend() {
-        let points = [0.1, 1.0, 10.0, 100.0].map(|hz| FrequencyPoint {
-            hz,
-            gain: 1.0 / (1.0 + hz),
-            phase: -36.0 * hz,
-        });
+        let points = [0.1, 1.0, 10.0, 100.0].map(|hz| [hz, 1.0 / (1.0 + hz), -36.0 * hz]);
         let curve = |label, dashed| FrequencyCurve {
             label,
             points: &points,
@@ -209,11 +215,10 @@ mod tests {
         let svg = frequency(&FrequencyPlot {
             title: "Frequency response",
             curves: &[curve("about off", false), curve("about on", true)],
-            measured: &[Estimate {
-                measured: points[1],
+            measured: &[MeasuredResponse {
+                at: points[1],
                 gain: [0.4, 0.6],
                 phase: [-40.0, -30.0],
-                run: points[1],
             }],
         });
         check(&svg);
@@ -236,22 +241,14 @@ mod tests {
     #[test]
     fn absurd_input_never_panics() {
         for values in absurd_series() {
-            let points: Vec<_> = values
-                .iter()
-                .map(|v| FrequencyPoint {
-                    hz: *v,
-                    gain: *v,
-                    phase: -*v,
-                })
-                .collect();
+            let points: Vec<_> = values.iter().map(|v| [*v, *v, -*v]).collect();
             let measured: Vec<_> = points
                 .iter()
                 .take(500)
-                .map(|point| Estimate {
-                    measured: *point,
-                    gain: [f64::NAN, point.gain],
-                    phase: [point.phase, f64::INFINITY],
-                    run: *point,
+                .map(|point| MeasuredResponse {
+                    at: *point,
+                    gain: [f64::NAN, point[1]],
+                    phase: [point[2], f64::INFINITY],
                 })
                 .collect();
             for dashed in [false, true] {

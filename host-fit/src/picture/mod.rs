@@ -34,7 +34,7 @@ pub use closed_loop::{ClosedLoop, LoopRun, closed_loop};
 pub use curve::{BandPoint, CurvePlot, curve};
 pub use delay_law::{DelayEdge, DelayLawPlot, LawPoint, MeasuredDelay, delay_law};
 pub use format::{readable_time, significant, time};
-pub use frequency::{FrequencyCurve, FrequencyPlot, frequency};
+pub use frequency::{FrequencyCurve, FrequencyPlot, MeasuredResponse, frequency};
 pub use ladder::{Ladder, LadderRecord, LadderStep, ladder};
 pub use lines::{Line, LinePlot, lines};
 pub use living::{Living, Stretches, packed};

@@ -305,17 +305,16 @@ fn spectra(runs: &[Run<'_>], residuals: &[Residuals]) -> Option<Figure> {
     ))
 }
 
+/// Labels of the two curves of each model.
+fn labels(runs: &[Run<'_>], curves: [&str; 2]) -> Vec<[String; 2]> {
+    let each = runs.iter();
+    each.map(|run| curves.map(|curve| format!("{}: {curve}", run.label)))
+        .collect()
+}
+
 fn responses(runs: &[Run<'_>]) -> Option<Figure> {
     let found: Vec<_> = runs.iter().map(|run| step_response(run.model)).collect();
-    let labels: Vec<[String; 2]> = runs
-        .iter()
-        .map(|run| {
-            [
-                format!("{}: opening from rest", run.label),
-                format!("{}: closing from steady", run.label),
-            ]
-        })
-        .collect();
+    let labels = labels(runs, ["opening from rest", "closing from steady"]);
     let mut drawn = Vec::new();
     for (i, (response, [opening, closing])) in found.iter().zip(&labels).enumerate() {
         let Some(response) = response else { continue };
@@ -423,15 +422,7 @@ fn over_records(
 
 /// The frequency response of each model, linearised at the two levels of the step response.
 fn at_levels(runs: &[Run<'_>], levels: &[[Option<FrequencyResponse>; 2]]) -> Option<Figure> {
-    let labels: Vec<[String; 2]> = runs
-        .iter()
-        .map(|run| {
-            [
-                format!("{}: about off", run.label),
-                format!("{}: about on", run.label),
-            ]
-        })
-        .collect();
+    let labels = labels(runs, ["about off", "about on"]);
     let values = |response: &FrequencyResponse| -> Vec<[f64; 3]> {
         let points = response.points.iter();
         points.map(FrequencyPoint::values).collect()

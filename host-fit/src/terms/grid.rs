@@ -46,6 +46,11 @@ pub(super) fn grid(spec: &Spec, model: &Model, known: &Known) -> Vec<Vec<f64>> {
             logarithmic(p, RULES.grid_of_frequencies)
         } else if p.is_logarithmic() {
             logarithmic(p, points)
+        } else if p.unit == Unit::Y {
+            let levels = RULES.grid_of_levels.iter();
+            levels
+                .map(|share| StartValue::Level(*share).value(p, &facts))
+                .collect()
         } else {
             let values = p.starts.iter();
             values
@@ -88,6 +93,25 @@ mod tests {
                 assert!(values.iter().all(|v| v.is_finite()), "{}", spec.name);
             }
         }
+    }
+
+    /// A user's effect with a threshold is screened over the levels of the records, wherever its own start is.
+    #[test]
+    fn a_threshold_in_y_is_screened_over_the_range_of_the_records() {
+        const THRESHOLD: [Parameter; 1] =
+            [Parameter::new("threshold", Unit::Y, [-10.0, 10.0], &[7.0]).stepwise()];
+        let spec = Spec {
+            parameters: &THRESHOLD,
+            ..Spec::PLAIN
+        };
+        let y: Vec<f64> = (0..2000).map(|k| (k % 100) as f64 / 100.0).collect();
+        let record = Record::new("r", Use::Identify, 0.001, vec![0.0; 2000], y);
+        let levels = grid(&spec, &Model::default(), &Known::of(&[&record])).concat();
+        assert_eq!(levels.len(), RULES.grid_of_levels.len());
+        assert!(
+            levels.iter().all(|y| (0.05..0.95).contains(y)),
+            "{levels:?}"
+        );
     }
 
     #[test]

@@ -99,15 +99,15 @@ mod tests {
     use crate::terms::Bench;
     use model_core::effects::spec;
 
-    /// The gain of a starting vortex ends at 3.
+    /// The gain of a starting vortex ends at 3; the lower threshold of a hysteresis ends at the upper one.
     #[test]
     fn an_effect_at_the_end_of_its_range_reaches_a_bound() {
         let records = records(&[], &[], 3);
         let bench = Bench::of(&base(&records), &records).expect("records to learn from");
-        let spec = spec("starting-vortex").expect("in the catalogue");
         let judged = bench.judge.refitted(&bench.given).expect("stable");
-        let with = |gain: f64| {
-            let parameters = vec![gain, 0.02];
+        let with = |name: &str, parameters: &[f64]| {
+            let spec = spec(name).expect("in the catalogue");
+            let parameters = parameters.to_vec();
             let mut judged = judged.clone();
             judged.fits[0].model.add(spec, &parameters, None);
             let grading = bench.given.grading;
@@ -122,9 +122,14 @@ mod tests {
                 ..Hypothesis::new(judged)
             }
         };
-        assert!(with(3.0).reaches_a_bound());
-        assert!(!with(1.5).reaches_a_bound());
+        let vortex = |gain: f64| with("starting-vortex", &[gain, 0.02]);
+        assert!(vortex(3.0).reaches_a_bound());
+        assert!(!vortex(1.5).reaches_a_bound());
         // A small amplitude is no bound.
-        assert!(!with(0.001).reaches_a_bound());
+        assert!(!vortex(0.001).reaches_a_bound());
+        let relay = |upper: f64, lower: f64| with("attachment-hysteresis", &[upper, lower, 0.2]);
+        assert!(!relay(0.6, 0.3).reaches_a_bound());
+        assert!(relay(0.3, 0.3).reaches_a_bound());
+        assert!(relay(0.3, 0.6).reaches_a_bound());
     }
 }

@@ -62,6 +62,7 @@ impl Search<'_> {
             }
         };
         let proposals = self.each_effect(lean.model());
+        let alone = parallel::some(&proposals, |proposal| self.alone(lean.model(), proposal));
         // A delay by whole samples has no derivative: a fit that starts with a path of the jets ends with it. Effects are
         // therefore fitted without such terms, too.
         let in_the_jet = |term: &Term| term.place() == Some(Place::Jet);
@@ -70,12 +71,13 @@ impl Search<'_> {
             let others = bases[0].iter().filter(|term| !in_the_jet(term));
             bases.push(others.cloned().collect());
         }
-        let all: Vec<(&Proposal, &Vec<Term>)> = proposals
+        let all: Vec<(&(Model, Vec<Term>), &Vec<Term>)> = alone
             .iter()
-            .flat_map(|proposal| bases.iter().map(move |bases| (proposal, bases)))
+            .flat_map(|alone| bases.iter().map(move |bases| (alone, bases)))
             .collect();
-        let mut begun = parallel::some(&all, |(proposal, bases)| {
-            self.begun(hypothesis, &effects, bases, lean.model(), proposal)
+        let mut begun = parallel::some(&all, |((with, added), bases)| {
+            let effects = [effects.as_slice(), added].concat();
+            self.begun(hypothesis, &effects, bases, lean.model(), with)
         });
         order::ascending(&mut begun, |one| one.score);
         begun.truncate(RULES.finished);
@@ -129,40 +131,48 @@ impl Search<'_> {
         all
     }
 
-    /// The fit of a proposal on `lean`, with the base terms of `hypothesis` that are predicted to be needed.
+    /// `lean` with the effect of a proposal, fitted briefly, and the effect as fitted.
+    fn alone(&self, lean: &Model, proposal: &Proposal) -> Option<(Model, Vec<Term>)> {
+        if self.interrupted() {
+            return None;
+        }
+        let fit = match &proposal.terms[..] {
+            [Term::Effect { spec, .. }] if self.is_fitted_anew(lean, spec) => {
+                self.fitted_anew(lean, spec, &self.brief_for(lean))?
+            }
+            _ => self.set_out(lean, proposal, RULES.brief)?,
+        };
+        let added = proposal.terms.iter().map(|term| term.as_in(&fit.model));
+        let added = added.collect();
+        Some((fit.model, added))
+    }
+
+    fn brief_for(&self, model: &Model) -> FitOptions {
+        FitOptions {
+            iterations: RULES.brief,
+            ..self.judge.options_for(model)
+        }
+    }
+
+    /// The fit of `with`, which has these `effects`, with the base terms of `hypothesis` that are predicted to be needed.
     fn begun(
         &self,
         hypothesis: &Hypothesis,
         effects: &[Term],
         bases: &[Term],
         lean: &Model,
-        proposal: &Proposal,
+        with: &Model,
     ) -> Option<Begun> {
         if self.interrupted() {
             return None;
         }
         let learning = self.judge.learning(0);
-        let options = |model: &Model| FitOptions {
-            iterations: RULES.brief,
-            ..self.judge.options_for(model)
-        };
-        let briefly = |model: &Model| fit(model, &learning, &options(model)).ok();
-        let with = match &proposal.terms[..] {
-            [Term::Effect { spec, .. }] if self.is_fitted_anew(lean, spec) => {
-                self.fitted_anew(lean, spec, &options(lean))?
-            }
-            _ => self.set_out(lean, proposal, RULES.brief)?,
-        };
-        let added: Vec<Term> = proposal
-            .terms
-            .iter()
-            .map(|term| term.as_in(&with.model))
-            .collect();
+        let briefly = |model: &Model| fit(model, &learning, &self.brief_for(model)).ok();
         let own = hypothesis.judged.model();
         let bases: Vec<Term> = bases.iter().map(|term| term.as_in(own)).collect();
         let returned = bases
             .iter()
-            .fold(with.model, |model, term| term.added_to(&model, &[]));
+            .fold(with.clone(), |model, term| term.added_to(&model, &[]));
         let joint = briefly(&returned)?;
         let before = hypothesis.judged.fits[0].mean_square().sqrt();
         let is_within = |fit: &Fit, factor: f64| fit.mean_square().sqrt() <= factor * before;
@@ -173,7 +183,7 @@ impl Search<'_> {
         if !is_within(&joint, RULES.in_reach) {
             return None;
         }
-        let joint = settle_fixed_delay(joint, &learning, &options(&returned)).ok()?;
+        let joint = settle_fixed_delay(joint, &learning, &self.brief_for(&returned)).ok()?;
         let screen = Screen::new(self.judge, &joint.model)?;
         let (needless, loss) = screen.needless(&bases, lean, joint.sum_of_squares);
         let mut model = joint.model.clone();
@@ -182,12 +192,7 @@ impl Search<'_> {
         }
         let needed = (0..bases.len()).filter(|index| !needless.contains(index));
         let needed = needed.map(|index| bases[index].clone());
-        let terms: Vec<Term> = effects
-            .iter()
-            .chain(&added)
-            .cloned()
-            .chain(needed)
-            .collect();
+        let terms: Vec<Term> = effects.iter().cloned().chain(needed).collect();
         let rmse = self.judge.held_out(|_| &joint.model).ok()?.rmse();
         let cost: usize = terms.iter().map(Term::cost).sum();
         Some(Begun {

@@ -26,14 +26,8 @@ pub struct Proposal {
 impl Proposal {
     /// An effect without a prediction, for `model`.
     pub(super) fn unrated(spec: &'static Spec, model: &Model) -> Self {
-        let term = Term::Effect {
-            spec,
-            parameters: spec.parameters.iter().map(|p| p.starts[0]).collect(),
-            grading: model.grading,
-            reference: None,
-        };
         Self {
-            terms: vec![term],
+            terms: vec![Term::unfitted(spec, model)],
             coefficients: vec![Vec::new()],
             left: 1.0,
             score: 0.0,

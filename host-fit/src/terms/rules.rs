@@ -98,6 +98,8 @@ rules! {
     grid: [usize; 3] = [12, 4, 3], "", "judgement";
     /// Grid points along a range of frequencies, finer because a lightly damped mode is narrow.
     grid_of_frequencies: usize = 28, "", "judgement";
+    /// Grid of levels of y for an effect whose card does not list its starting points.
+    grid_of_levels: [f64; 6] = [0.1, 0.25, 0.4, 0.55, 0.7, 0.88], "share of the range between the 5 and 95 % quantiles", "a grid";
 
     /// The inner unit of y: this share of all samples is within one unit of the rest level.
     full: f64 = 0.995, "share of the samples", "judgement: larger values are noise";

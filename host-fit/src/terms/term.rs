@@ -379,6 +379,16 @@ impl Term {
         model
     }
 
+    /// An effect for `model`, with the first starting values of its card.
+    pub(super) fn unfitted(spec: &'static Spec, model: &Model) -> Self {
+        Self::Effect {
+            spec,
+            parameters: spec.parameters.iter().map(|p| p.starts[0]).collect(),
+            grading: model.grading,
+            reference: None,
+        }
+    }
+
     /// The term with the parameters and the reference that it has in `model`, as starting values.
     #[must_use]
     pub(super) fn as_in(&self, model: &Model) -> Self {

@@ -71,11 +71,11 @@ impl Search<'_> {
             let others = bases[0].iter().filter(|term| !in_the_jet(term));
             bases.push(others.cloned().collect());
         }
-        let all: Vec<(&(Model, Vec<Term>), &Vec<Term>)> = alone
+        let pairs = alone
             .iter()
-            .flat_map(|alone| bases.iter().map(move |bases| (alone, bases)))
-            .collect();
-        let mut begun = parallel::some(&all, |((with, added), bases)| {
+            .flat_map(|alone| bases.iter().map(move |bases| (alone, bases)));
+        let pairs: Vec<_> = pairs.collect();
+        let mut begun = parallel::some(&pairs, |((with, added), bases)| {
             let effects = [effects.as_slice(), added].concat();
             self.begun(hypothesis, &effects, bases, lean.model(), with)
         });

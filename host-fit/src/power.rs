@@ -29,8 +29,8 @@ rules! {
     pub struct Rules in "power";
 
     /// Power: an effect counts as detectable if it is found in this share of cases.
-    power: f64 = 0.8, "share of cases", "convention; `cargo xtask calibrate` counts";
-    /// Most unnamed terms that may imitate the effect.
+    power: f64 = 0.8, "share of cases", "convention; counted by `cargo xtask calibrate`";
+    /// Largest number of unnamed terms that may imitate the effect.
     terms: usize = 6, "", "number of terms that `identify` adds for a flow with two memories";
     /// Penalty of each of these terms, in parameters.
     term_cost: f64 = 2.0, "parameters", "a lag and its weight";

@@ -13,7 +13,7 @@ rules! {
     /// With known time constants, a delay with a standard error above this share of them counts as not
     /// measured.
     worst_share: f64 = 0.25, "share of the sum of time constants", "judgement: a quarter of a response";
-    /// A change of a graded command by less than this is no edge.
+    /// A change of a graded command by less than this is not an edge.
     smallest_edge: f64 = 0.05, "share of the range of u", "judgement: a twentieth of the largest response";
     /// One plant describes the records if its residual is at most this share of the spread of y, beyond the
     /// noise.
@@ -31,14 +31,14 @@ rules! {
     /// is less.
     reach: f64 = 3.0, "response times", "judgement: 95 % of a response of first order";
 
-    /// Fewest samples on either side of an arrival.
+    /// Smallest number of samples on either side of an arrival.
     least_side: usize = 6, "samples", "judgement";
     /// Grid spacing of arrivals.
     resolution: f64 = 0.25, "samples", "judgement: a quarter of the rounding to whole samples";
     /// Time constants of the motion before a response; 0 is a straight line.
-    before_shapes: [f64; 9] = [0.0, 8.0, 12.0, 17.0, 25.0, 36.0, 55.0, 90.0, 180.0], "samples", "a grid in steps of about 1.5";
+    before_shapes: [f64; 9] = [0.0, 8.0, 12.0, 17.0, 25.0, 36.0, 55.0, 90.0, 180.0], "samples", "a geometric grid with a factor of about 1.5";
     /// Time constants of a response; 0 is a straight line.
-    response_shapes: [f64; 17] = [0.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 128.0, 256.0, 3.0, 6.0, 11.0, 22.0, 45.0, 90.0, 180.0, 360.0], "samples", "a grid in steps of about 1.4, every other one first";
+    response_shapes: [f64; 17] = [0.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 128.0, 256.0, 3.0, 6.0, 11.0, 22.0, 45.0, 90.0, 180.0, 360.0], "samples", "a geometric grid with a factor of about 1.4, every other value first";
     /// The first search for the start of a response uses only this many of the shapes before and after it.
     coarse_shapes: usize = 9, "", "every other response";
     /// Largest autocorrelation of neighbouring residuals by which a variance is corrected; a higher one means that
@@ -53,7 +53,7 @@ rules! {
     /// The weight of a level change is at most this many times the median weight.
     front_largest: f64 = 2.0, "times the median", "judgement: limits the weight of one large response";
 
-    /// Fewest measured edges for a law.
+    /// Smallest number of measured edges for a law.
     law_edges: usize = 5, "edges", "the law has three parameters";
     /// First value of p2·(range of ỹ) on its logarithmic grid.
     slowest_rate: f64 = 0.05, "", "the law is almost linear over the range";
@@ -73,9 +73,9 @@ rules! {
     /// A response counts as settled after this time.
     response: usize = 5, "times the reach", "judgement: 99 % of a response of first order";
 
-    /// Fewest measured edges for the tests.
+    /// Smallest number of measured edges for the tests.
     tested_edges: usize = 8, "edges", "judgement";
-    /// Fewest measured edges in each direction for the tests.
+    /// Smallest number of measured edges in each direction for the tests.
     tested_each: usize = 3, "edges", "judgement";
     /// Permutations per test.
     shuffles: usize = 1999, "", "convention: a p-value of 0.01 then has a standard error of 0.002";
@@ -92,8 +92,7 @@ rules! {
     /// Largest autocorrelation of neighbouring residuals by which a variance is corrected in a fit to whole
     /// records.
     slowest_disturbance: f64 = 0.98, "", "corresponds to a variance 99 times as large: a disturbance that lasts 50 samples";
-    /// Least standard error of a delay: loggers and simulations differ by up to a sample in the simultaneity of u
-    /// and y.
+    /// Least standard error of a delay: loggers and simulations differ by up to a sample in the alignment of u and y.
     clock: f64 = 0.5, "samples", "judgement: an interval of at least ± 1 sample; tested in `dead_time.rs` on tests/data/strangers";
     /// Edges per record on which the sensitivity to `reach` is measured.
     settings_edges: usize = 12, "edges", "judgement: more edges would triple the time on long records";

@@ -155,7 +155,7 @@ rules! {
     /// Refined pulse trains differ by at least this in the duty, or by `distinct_period`.
     distinct_duty: f64 = 0.1, "", "judgement";
 
-    /// Most switching opportunities in a horizon.
+    /// Largest number of switching opportunities in a horizon.
     blocks: u32 = 60, "", "judgement: limits the time";
     /// Beam width: commands kept per switching opportunity.
     beam: usize = 16, "", "judgement: limits the time";

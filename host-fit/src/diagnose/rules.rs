@@ -28,11 +28,12 @@ rules! {
          1 to 4 % unexplained";
     /// Share of the unexplained variance that named effects must explain if the noise level is unknown.
     explained_in_unknown_noise: f64 = 0.75, "share of the model error above the noise", "the public sets";
-    /// If a model without the effects is at the noise level, effects that explain less than this share of what it leaves
-    /// are not named.
+    /// If a model without the effects is at the noise level, effects that explain less than this share of its
+    /// unexplained variance are not named.
     most: f64 = 0.5, "share of the model error above the noise", "published flows without an effect: 28 nats of \
          evidence, and a share of 0.30";
-    /// Otherwise effects that explain at least this share are named, or reported as surrogates.
+    /// If no model without the effects is at the noise level, effects that explain at least this share are named, or
+    /// reported as surrogates.
     stands_in: f64 = 0.25, "share of the model error above the noise", "published flows: an echo with 241 nats of \
          evidence explains 0.46";
     /// An effect is certified although another error remains if its e-value is large enough and it explains this

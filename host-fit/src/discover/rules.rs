@@ -6,7 +6,7 @@ rules! {
     /// When a term outside the catalogue is reported, and how its curve is drawn.
     pub struct Rules in "discover";
 
-    /// Most points of a curve. The coordinate spends equal times between neighbouring points.
+    /// Largest number of points of a curve. The coordinate spends equal times between neighbouring points.
     points: usize = 8, "", "judgement: limits the derivatives per run";
     /// A coordinate with fewer distinct points than this is not screened.
     fewest_points: usize = 3, "", "judgement: a curve needs more than the two points of a line";
@@ -14,7 +14,7 @@ rules! {
     inserted: usize = 3, "", "judgement: three points locate a step four times more closely";
     /// Rounds of inserting points.
     refinements: usize = 2, "rounds", "judgement";
-    /// Most points of a curve after insertion.
+    /// Largest number of points of a curve after insertion.
     most_points: usize = 11, "", "judgement: 1.5 times the derivatives of one run";
     /// Share of the samples outside the first and the last point.
     beyond: f64 = 0.01, "share of the samples", "judgement";
@@ -26,7 +26,7 @@ rules! {
     tried: usize = 10, "", "judgement";
     /// Curves that are fitted for a few iterations, for each base of lower order than the best.
     tried_leaner: usize = 4, "", "judgement";
-    /// Most curves fitted for a few iterations that have the same place and kind of coordinate.
+    /// Largest number of curves fitted for a few iterations that have the same place and kind of coordinate.
     of_a_kind: usize = 2, "", "judgement: memories of neighbouring lengths have similar gains";
     /// Curves refitted in full, in addition to the best of each place and each base.
     finished: usize = 4, "", "judgement";
@@ -66,10 +66,10 @@ rules! {
     alike: f64 = 0.01, "share of the rms error", "judgement: twice the margin of effects, because a curve has more freedom";
     /// The error of a formula may exceed that of the curve it replaces by this much.
     formula: f64 = 0.01, "share of the rms error", "judgement";
-    /// An effect of the catalogue resembles a curve if their changes of the free run correlate at least so
-    /// much.
+    /// An effect of the catalogue resembles a curve if the correlation of their changes of the free run is at least
+    /// this.
     resembles: f64 = 0.9, "", "judgement";
-    /// Most knots of a trace per record.
+    /// Largest number of knots of a trace per record.
     knots: usize = 100, "", "judgement: limits the time";
     /// Weight of the size against the curvature in the prior of a trace.
     smallness: f64 = 0.01, "", "judgement: the curvature over ten knots has the same weight as the size";

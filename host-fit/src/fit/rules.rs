@@ -9,7 +9,7 @@ rules! {
     /// A fit without a better step has converged if the cosines between the residual and all derivatives are below
     /// this.
     stationary: f64 = 1e-6, "cosine", "judgement; tested in `levenberg.rs`";
-    /// Most iterations of a fit.
+    /// Largest number of iterations of a fit.
     iterations: usize = 30, "", "judgement";
     /// A fit ends when an iteration lowers the sum of squares by less than this.
     tolerance: f64 = 1e-5, "share of the sum of squares", "judgement: far below the resolution of a diagnosis";
@@ -37,14 +37,14 @@ rules! {
     followed: usize = 2, "", "judgement, on simulated rigs";
     /// Starting points that are tried with each response to jets of part strength.
     regraded: usize = 4, "", "judgement, on simulated rigs";
-    /// Most starting points of an effect.
+    /// Largest number of starting points of an effect.
     most_starts: usize = 12, "", "judgement, on simulated rigs";
     /// Starting points of a measured input's effect that are tried with every fresh start of the lowest order.
     input_starts: usize = 4, "", "judgement: both signs and several lags";
     /// Starting points of a delay law.
     law_starts: usize = 3, "", "judgement, on simulated rigs";
     /// Initial time constants of the lowest-order model.
-    time_constants_s: [f64; 3] = [0.02, 0.06, 0.2], "s", "judgement, in steps of 3";
+    time_constants_s: [f64; 3] = [0.02, 0.06, 0.2], "s", "judgement: a factor of 3 apart";
     /// Longest of the eight initial delays of the lowest-order model.
     longest_start_s: f64 = 0.12, "s", "twice the paper's delay";
     /// Lower limit of the largest value of a signal of order 1, for which the catalogue's ranges are valid; other
@@ -61,7 +61,7 @@ rules! {
     records_of_scatter: usize = 3, "records", "judgement: with fewer records the variation is not measurable";
     /// The scatter of the level is modelled if it is at least this share of the noise.
     share_of_scatter: f64 = 0.05, "share of the variance", "judgement: a smaller scatter is negligible";
-    /// The scatter of the level must vary between records by this much. Noise that grows with the level in the same
+    /// The scatter of the level must vary between records by at least this. Noise that grows with the level in the same
     /// way in all records does not.
     scatter_differs: f64 = 0.12, "share of its mean", "scatter of a level in 20 repeats: 0.3; coloured noise (40 ms) in 10 000 samples: 0.03";
     /// The remaining noise is at least this share of the variance.
@@ -72,7 +72,8 @@ rules! {
 
     /// Number of runs that a record of a drifting plant is divided into.
     pieces: usize = 20, "", "judgement; the ball screw EMPS in docs/history/diagnosis.md";
-    /// A piece is at least this multiple of the longest lag or delay. One part in this many precedes scoring.
+    /// A piece is at least this multiple of the longest lag or delay. Before each piece the run follows the measurement
+    /// for the length of a piece divided by this number; these samples are not scored.
     memories: usize = 8, "", "judgement";
     /// A plant counts as drifting if more than this share of an initial disturbance remains after a whole
     /// record.

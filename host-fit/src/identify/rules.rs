@@ -21,7 +21,7 @@ rules! {
     kicks: usize = 6, "kicks", "tuned on sets 1 to 3 of docs/search.md";
     /// A free-run search ends after this many kicks without improvement, per unit of patience.
     free_kicks: usize = 8, "kicks", "tuned on sets 1 to 3 of docs/search.md";
-    /// Most kicks of a free-run search per unit of patience.
+    /// Largest number of kicks of a free-run search per unit of patience.
     most_free_kicks: usize = 12, "kicks", "tuned on sets 1 to 3 of docs/search.md";
     /// Probability that a kick also moves the input delays.
     kicked_inputs: f64 = 0.3, "", "tuned on sets 1 to 3 of docs/search.md";
@@ -38,7 +38,7 @@ rules! {
     /// A predicted minimum is simulated if it is below this.
     promising: f64 = 1.01, "times the best error", "judgement";
     /// Steps of the line search over input delays.
-    input_moves: [f64; 9] = [0.02, 0.1, 0.3, 0.5, 1.0, 2.0, 3.0, 6.0, 12.0], "samples", "a grid in steps of 2 to 5";
+    input_moves: [f64; 9] = [0.02, 0.1, 0.3, 0.5, 1.0, 2.0, 3.0, 6.0, 12.0], "samples", "a grid with factors of 2 to 5";
     /// Input delays are searched when a descent comes within this factor of the best.
     close: f64 = 1.01, "times the best error", "judgement";
     /// A descent ends with a sweep that gains less than this.

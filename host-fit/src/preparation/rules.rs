@@ -7,7 +7,8 @@ rules! {
     /// samples are scored.
     pub struct Rules in "preparation";
 
-    /// Most samples to which the first-order reference is fitted; longer records are averaged over neighbours.
+    /// Largest number of samples to which the first-order reference is fitted; longer records are averaged over
+    /// neighbours.
     reference_samples: usize = 20_000, "samples", "judgement: limits the time";
     /// Shortest time constant of the first-order reference.
     shortest_time: f64 = 0.5, "samples", "faster responses are not distinguishable from an immediate one";
@@ -74,8 +75,8 @@ rules! {
     near_zero: f64 = 0.1, "size of the response", "judgement: a first-order response determines the level of a \
          bilinear flow to a tenth";
 
-    /// The records' offsets and the reference response are fitted alternately until the memory of the residual no
-    /// longer falls to this share.
+    /// The records' offsets and the reference response are fitted alternately until a round no longer lowers the memory
+    /// of the residual (samples per independent sample) to this share.
     memory_falls: f64 = 0.9, "share of the preceding value", "judgement: each round removes three quarters of \
          the remaining bias";
     /// Number of residual samples per independent sample. Above it a constant of a record may be a missing effect

@@ -16,7 +16,7 @@ rules! {
     correlation_times: f64 = 8.0, "correlation times", "tested in `the_p_value_is_calibrated_for_coloured_errors`";
     /// Shortest block.
     shortest_block: usize = 20, "samples", "judgement";
-    /// Fewest blocks; limits the block length.
+    /// Smallest number of blocks; limits the block length.
     fewest_blocks: usize = 24, "blocks", "judgement: a test with fewer blocks has no power";
     /// Values used to estimate a correlation time.
     plenty: usize = 4000, "values", "judgement: limits the time";
@@ -31,7 +31,7 @@ rules! {
     /// For folds over whole records, the error must also occur at the same place in this share of the
     /// records.
     agreeing_records: f64 = 2.0 / 3.0, "share of the records", "judgement";
-    /// Fewest training samples of a bin.
+    /// Smallest number of training samples of a bin.
     fewest_of_bin: usize = 20, "samples", "convention";
 
     /// Bins of a coordinate with many values.
@@ -60,7 +60,7 @@ rules! {
 
     /// Segment length of spectra.
     piece: usize = 1024, "samples", "judgement: the longest lags are half as long";
-    /// Fewest segments of a spectrum.
+    /// Smallest number of segments of a spectrum.
     fewest_pieces: usize = 6, "", "three for training and three for testing";
     /// A band's spectrum must exceed that of the noise by this many standard errors.
     band_standard_errors: f64 = 3.0, "standard errors", "convention; tested in `pure_noise_explains_nothing`";
@@ -69,14 +69,14 @@ rules! {
     trend_level: f64 = 0.002, "p-value", "1 % over about five tests";
     /// Weaker correlations are not reported.
     trend_weakest: f64 = 0.5, "correlation", "judgement: a quarter of the variance";
-    /// Fewest edges of a trend.
+    /// Smallest number of edges of a trend.
     trend_edges: usize = 8, "edges", "convention";
 
     /// Without `y_sd`: length of command history that must agree for two samples to count as repeats.
     history: usize = 1000, "samples", "judgement: four windows of ỹ";
     /// Periods back that are compared, because a fault of every n-th pulse repeats only after n periods.
     periods_back: usize = 8, "periods", "the longest cycle of pulses";
-    /// Fewest pairs of repeats for an estimate of the noise.
+    /// Smallest number of pairs of repeats for an estimate of the noise.
     fewest_histories: f64 = 2.0, "histories", "judgement; tested in `repeats_give_the_noise_even_when_every_third_pulse_is_missing`";
     /// A command is periodic if it has at least this many periods.
     fewest_periods: usize = 4, "periods", "judgement";
@@ -85,7 +85,7 @@ rules! {
 
     /// Coordinates with a smaller explained share are not mentioned.
     worth_saying: f64 = 0.1, "share of the model error above the noise", "judgement";
-    /// Most coordinates that are mentioned.
+    /// Largest number of coordinates that are mentioned.
     most_said: usize = 3, "", "judgement";
     /// A mean error is reported if it is at least this share of the rms error.
     worth_saying_bias: f64 = 0.3, "share of the rms error", "judgement: 9 % of the error energy";

@@ -6,7 +6,7 @@ rules! {
     /// Parameters of the mesh search for delays.
     pub struct Rules in "search";
 
-    /// Most evaluations of the objective; cached points are free.
+    /// Largest number of evaluations of the objective; cached points are free.
     evaluations: usize = 20_000, "", "judgement: minutes";
     /// Initial frame size.
     initial_frame: f64 = 0.1, "share of each variable's range", "NOMAD's default";

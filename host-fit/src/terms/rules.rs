@@ -11,7 +11,7 @@ rules! {
     /// Free runs are not restarted, whatever the poles of the given model, if the first-order reference explains at
     /// least this share with a time constant well below the length of the records.
     self_regulates: f64 = 0.5, "share of the variance", "judgement: half";
-    /// Most measured channels that are candidates of a diagnosis.
+    /// Largest number of measured channels that are candidates of a diagnosis.
     inputs: usize = 4, "channels", "judgement: limits the time";
     /// A channel is not an input if its correlation with y, the command or time exceeds this. It is then the same
     /// quantity in another unit, a copy of the command, or a clock.
@@ -45,7 +45,7 @@ rules! {
     with_effects: usize = 5, "", "the true effect was among the first three on 80 rigs of six families";
     /// Proposals without effects that are refitted per model and round.
     without_effects: usize = 4, "", "a level-dependent rate was the fourth best after lags";
-    /// Most refitted proposals without effects that are of one kind.
+    /// Largest number of refitted proposals without effects that are of one kind.
     of_one_kind: usize = 2, "", "judgement: the fit can move the lags";
     /// Number of proposals that are refitted in full, of those fitted for a few iterations.
     finished: usize = 4, "", "80 rigs of six families";
@@ -53,8 +53,8 @@ rules! {
     most_given: usize = 6, "terms", "judgement: each of them is tested for removal at the end";
     /// An effect is fitted further in place of base terms if its error after a brief fit is below this factor.
     promising: f64 = 2.0, "times the error", "judgement: base terms that imitate the effect are still in the model";
-    /// An effect in place of base terms is refitted in full if its error after further iterations is within this factor of
-    /// the model's.
+    /// An effect in place of base terms is refitted in full if its error after further iterations is within this factor
+    /// of the model's.
     in_reach: f64 = 1.2, "times the error", "judgement: a valve lag in place of a film lag has 1.15 times the error after the first iterations";
     /// Iterations of the brief fit of each proposal.
     brief: usize = 6, "iterations", "with fewer iterations, thresholds stay at their starting values";
@@ -78,7 +78,7 @@ rules! {
     /// best structure's by this. A first- or second-order model is preferred if its error is larger by at most this
     /// and no test distinguishes the two.
     linear_better: f64 = 0.03, "share of the rms error", "judgement: an inverse response has a larger error";
-    /// Most evaluations of the mesh adaptive direct search for the delays of a chosen structure.
+    /// Largest number of evaluations of the mesh adaptive direct search for the delays of a chosen structure.
     settling: usize = 300, "", "judgement: each evaluation is a brief fit; a structure with five delays needs 60 to 150";
     /// Iterations of the parameter fit at each evaluation of the direct search for the delays.
     settling_iterations: usize = 2, "iterations", "judgement: each fit starts from the best parameters so far";
@@ -111,9 +111,9 @@ rules! {
     /// First lag of the regular grid.
     regular_lags: u16 = 26, "samples", "continues the grid of the short lags";
     /// Time constants of a second lag of the flow that are screened.
-    second_lags: [f64; 5] = [1.5, 4.0, 10.0, 20.0, 40.0], "samples", "a grid in steps of 2 to 3";
+    second_lags: [f64; 5] = [1.5, 4.0, 10.0, 20.0, 40.0], "samples", "a grid with factors of 2 to 3";
     /// Time constants of a slow wake that are screened.
-    wakes_s: [f64; 5] = [0.1, 0.2, 0.4, 0.8, 1.6], "s at 1 kHz", "a grid in steps of 2";
+    wakes_s: [f64; 5] = [0.1, 0.2, 0.4, 0.8, 1.6], "s at 1 kHz", "a geometric grid with a factor of 2";
     /// Step by which the change of the rate with the level, and the strength of a wake, are perturbed for a
     /// derivative.
     slope: f64 = 0.1, "", "judgement: small, and far above rounding";
@@ -158,7 +158,7 @@ rules! {
     resamples: usize = 400, "", "the shares are then accurate to 0.025";
     /// A model is excluded if it wins less often than the best by more than this over √2.
     inflation: f64 = 0.1, "share of the resamples", "the ε of the inflated argmax (Adrian, Soloff and Willett, arXiv 2410.18268)";
-    /// Most folds of a cross-validation.
+    /// Largest number of folds of a cross-validation.
     most_folds: usize = 4, "", "judgement: limits the time";
     /// Share of the only record that is used for estimation.
     learned_share: f64 = 0.6, "share of the record from its first edge on", "judgement";

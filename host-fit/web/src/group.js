@@ -78,7 +78,7 @@ export class Group {
     ];
     switches.append(...names.map(([key, name, kind]) => this.toggle(key, name, kind)));
     this.switches = switches;
-    this.clear = button("clear the lit samples", "clear the lit samples (Escape)", () => this.view.light(null));
+    this.clear = button("clear the marked samples", "clear the marked samples (Escape)", () => this.view.light(null));
     this.clear.hidden = true;
     bar.append(moves, this.stretch, switches, this.clear);
     return bar;

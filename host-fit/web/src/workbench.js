@@ -93,7 +93,7 @@ function validation(s, data) {
     await ask("/api/ask", { validate: boxes.filter((box) => box.checked).map((box) => box.value).join("\n") });
     await refresh();
   }), { id: "choose" });
-  const note = el("span", { class: "muted" }, s.models.length ? "The models move into the folder earlier-1: their validation errors are of other records." : "");
+  const note = el("span", { class: "muted" }, s.models.length ? "The models move into the folder earlier-1: their validation errors were computed on other records." : "");
   const chosen = el("p", { hidden: true }, choose, " ", note);
   const changed = () => (chosen.hidden = boxes.every((box, i) => box.checked === (data.records[i].use === "validate")));
   return el("fieldset", { class: "records" }, el("legend", {}, "validation records"),

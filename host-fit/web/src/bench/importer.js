@@ -54,7 +54,7 @@ function draw() {
     const file = known.get(name);
     return el("li", {},
       el("strong", {}, name), ` ${file?.dialect ?? ""}: ${file?.variables.map((v) => v.name).join(", ") ?? ""} `,
-      el("label", {}, el("input", { type: "checkbox", name: "validate", value: name.replace(/\.[^.]*$/, ""), form: "mapping" }), "hold out"),
+      el("label", {}, el("input", { type: "checkbox", name: "validate", value: name.replace(/\.[^.]*$/, ""), form: "mapping" }), "validation record"),
       " ",
       button("leave out", () => { taken.delete(name); draw(); }, { "aria-label": `leave out ${name}` }));
   });
@@ -65,7 +65,7 @@ function draw() {
   const form = el("form", { id: "mapping", class: "fields", onsubmit: submit },
     choice("t", "time"), choice("u", "command u"), choice("y", "output y"),
     number("u-threshold", "on above (of u)"), number("y-scale", "factor of y"), number("y-offset", "added to y"),
-    number("period", "period (s), if no time"), number("fill-gaps", "fill gaps up to (s)"), number("hold-out-from", "hold out from (s)"),
+    number("period", "period (s), if no time"), number("fill-gaps", "fill gaps up to (s)"), number("hold-out-from", "validation from (s)"),
     el("label", {}, "title", el("input", { type: "text", name: "title" })),
     el("label", { class: "check" }, el("input", { type: "checkbox", name: "graded" }), "levels between off and on"),
     el("button", { type: "submit", class: "primary" }, "Import"));

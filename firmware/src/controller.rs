@@ -39,7 +39,8 @@ pub struct Settings {
     pub residual_envelope: f32,
 }
 
-/// Fewest equal readings that count as a stuck sensor: at long periods some readings are equal accidentally.
+/// Smallest number of equal readings that count as a stuck sensor: at long sample periods some readings are equal
+/// accidentally.
 const FEWEST_EQUAL: u32 = 20;
 
 impl Settings {

@@ -63,7 +63,7 @@ pub trait Law {
 /// The parameters of a law for model `M`, memories `Y` and `J`, and a look-ahead of `A` samples, such as
 /// `LAW` in a generated file.
 #[diagnostic::on_unimplemented(
-    message = "`{Self}` is no law that a board can run",
+    message = "a board cannot run `{Self}` as a law",
     note = "a model gets a law from `host-fit design`"
 )]
 pub trait Designed<M: Parts<f32>, Y: Memory<f32>, J: Memory<f32>, const A: usize>: Clone {

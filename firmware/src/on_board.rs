@@ -31,7 +31,7 @@ pub type OnBoard = driven!(model::Law, model);
 pub const PERIOD_US: u32 = match loop_period_us(model::SAMPLE_PERIOD_S as f64) {
     Some(period) => period,
     // `host-fit design` and `codegen --board` report the same with the key of the model file.
-    None => panic!("the boards' timers and watchdogs are good for 0.2 to 100 ms"),
+    None => panic!("the boards' timers and watchdogs support sample periods of 0.2 to 100 ms"),
 };
 
 /// Watchdog timeout for a sample, µs: 20 ms, or four periods if that is longer.

@@ -47,8 +47,8 @@ pub enum LineError {
     Constants(String),
     /// After a broken link a different board answers.
     #[error(
-        "after the link was broken a board with other firmware or constants answered; complete repeats until \
-        then are kept"
+        "after the connection was lost, a board with other firmware or constants answered; the repeats that were \
+            complete before are kept"
     )]
     AnotherBoard,
     /// No complete repeat was recorded.

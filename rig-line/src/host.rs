@@ -492,11 +492,12 @@ fn reason(status: Status, detail: u32) -> String {
     match status {
         Status::Busy => "another host uses the board; end that host first".into(),
         Status::TooLong => {
-            format!("it stores at most {detail} runs; play the command in shorter pieces")
+            format!("it stores at most {detail} intervals of constant command; play the command in shorter pieces")
         }
-        Status::Missing => format!("it received only the first {detail} runs; start again"),
+        Status::Missing => format!("it received only the first {detail} intervals of constant command; start again"),
         Status::TooShort => format!(
-            "run {detail} (counted from 0, the first one closed) is shorter than the valve's hold time in the \
+            "interval {detail} of constant command (counted from 0; in interval 0 the valve is closed) is shorter \
+                than the valve's hold time in the \
              board's rig constants; lengthen it"
         ),
         Status::OtherCommand => {

@@ -216,7 +216,7 @@ fn fits(command: &Command, board: &Info) -> Result<(), LineError> {
     }
     if command.runs.len() > usize::from(board.most_runs) {
         return Err(refused(format!(
-            "it has {} runs, but the board stores {}; play it in shorter pieces",
+            "it has {} intervals of constant command, but the board stores {}; play it in shorter pieces",
             command.runs.len(),
             board.most_runs
         )));

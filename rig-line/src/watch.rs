@@ -125,9 +125,9 @@ fn some_text<S: serde::Serializer>(path: &Option<PathBuf>, to: S) -> Result<S::O
 const SILENCE: Duration = Duration::from_secs(2);
 /// Longest time in which the board may answer without a new sample.
 const NOTHING_NEW: Duration = Duration::from_secs(10);
-/// After arming, the flow is far from y*; figures begin after this time, s …
+/// Errors and air are computed from this time after arming on, s; before it the flow is far from y*.
 const SETTLING_S: f64 = 1.0;
-/// … and after this many samples, because flows are slow at a long period.
+/// They also begin only after this many samples, because flows are slow at a long sample period.
 const SETTLING: u64 = 1000;
 
 /// Weight of a residual in the average that the board compares with its limit.

@@ -244,7 +244,7 @@ fn a_rig_is_calibrated() {
     rig.check().expect("a good one");
     assert!((rig.sensor.zero_counts - 900.0).abs() < 1.5, "{rig:?}");
     assert!((rig.friction(2700.0) - 1.0).abs() < 0.002, "{rig:?}");
-    // The sixth sample of asking is the last without an effect.
+    // The valve needs more than six samples to move, so seven samples are the shortest time with a response.
     assert_eq!(rig.hold_samples(), [7, 7], "{rig:?}");
     let [off, on] = rig.sensor.noise_counts.expect("noise");
     let expected = (41.0_f64 * 41.0 - 1.0).sqrt() / 12.0_f64.sqrt();
@@ -266,8 +266,7 @@ fn a_rig_without_air_or_at_a_rail_is_not_calibrated() {
     }
 }
 
-/// The law at work, then a sensor whose zero moves: logged from rest, judged, and
-/// found out.
+/// The law runs, then the sensor's zero moves: the log begins at rest, and the check of the model raises the alarm.
 #[test]
 fn a_loop_is_watched_logged_and_judged() {
     use rig_line::alarm::{Test, Verdict};

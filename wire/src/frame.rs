@@ -192,7 +192,7 @@ impl Receiver {
         self.left = 0;
         self.zero_due = false;
         self.damage = None;
-        // Zeros between frames are no frames.
+        // Zeros between frames are not frames.
         if !begun {
             return None;
         }
@@ -233,7 +233,7 @@ mod tests {
             (0..length)
                 .map(|_| {
                     seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-                    // Many zeros and, in long frames, long runs without.
+                    // Many zeros and, in long frames, long sequences without a zero.
                     let byte = (seed >> 24) as u8;
                     if length % 3 == 0 {
                         byte | 1

@@ -32,9 +32,9 @@ pub enum Status {
     Done = 0,
     /// Another host has the board.
     Busy = 1,
-    /// More runs than the board can store; the detail is that number.
+    /// More runs (intervals of constant command) than the board can store; the detail is the number that it can store.
     TooLong = 2,
-    /// Runs are missing before these; the detail is the number of stored runs.
+    /// Earlier runs of the command are missing; the detail is the number of stored runs.
     Missing = 3,
     /// A run is shorter than the valve's hold time; the detail is its index.
     TooShort = 4,

@@ -10,7 +10,7 @@
 use crate::bytes::{Reader, Writer};
 use crate::frame::{CONTENT, Frame};
 
-/// Most run lengths in one request.
+/// Largest number of run lengths in one request.
 pub const RUNS: usize = 56;
 
 /// What is asked.
@@ -56,7 +56,7 @@ pub enum Ask<'a> {
 /// A request.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Request<'a> {
-    /// Tells requests of a session apart.
+    /// Distinguishes the requests of a session.
     pub number: u16,
     /// Whose it is.
     pub session: u32,

@@ -8,7 +8,7 @@ use crate::bytes::Reader;
 use crate::frame::Frame;
 use crate::reply::Phase;
 
-/// Most samples in a frame.
+/// Largest number of samples in a frame.
 pub const BATCH: usize = 24;
 /// Fraction of a count in which the law's signals are sent.
 pub const STEPS: f32 = 8.0;

@@ -80,7 +80,7 @@ pub(crate) async fn take_in(
 
 fn too_large(largest: usize) -> String {
     format!(
-        "more than {} kB, or incomplete; import larger files with `host-fit import`",
+        "the file is incomplete or larger than {} kB; import larger files with `host-fit import`",
         largest >> 10
     )
 }

@@ -67,7 +67,7 @@ pub enum ProjectError {
     #[error("{path} is open in another workbench; use that one, or close it", path = .0.display())]
     Locked(PathBuf),
     /// `tree.json` is not a valid tree.
-    #[error("{path} is not a tree of this version ({cause}); name another folder with --project", path = .path.display())]
+    #[error("{path} is not a list of models of this version ({cause}); choose another folder with --project", path = .path.display())]
     Tree {
         /// The file.
         path: PathBuf,
@@ -75,7 +75,7 @@ pub enum ProjectError {
         cause: String,
     },
     /// Models of other data.
-    #[error("{path} contains models of another data set; name another folder with --project", path = .0.display())]
+    #[error("{path} contains models of another data set; choose another folder with --project", path = .0.display())]
     OtherData(PathBuf),
     /// A model that is not in the tree.
     #[error("there is no model {0}")]

@@ -26,7 +26,7 @@ struct Running {
     now: String,
     /// Best value of the running search so far, over its evaluations.
     best: Vec<(usize, f64)>,
-    /// Most evaluations of that search; 0 for none.
+    /// Largest number of evaluations of that search; 0 for none.
     budget: usize,
     started: Instant,
 }
@@ -107,7 +107,7 @@ impl Work {
     }
 
     pub(crate) fn tell(&self, event: &Value) {
-        // It is no error if no page is open.
+        // A task without an open page is not an error.
         let _ = self.shared.events.send(event.to_string());
     }
 

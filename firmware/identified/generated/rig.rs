@@ -1,4 +1,4 @@
-//! Constants of a rig. Generated from its rig.toml; measure the rig anew instead.
+//! Constants of a rig. Generated from its rig.toml; to change them, calibrate the rig again.
 
 /// Counts of the separated flow, y = 0.
 pub const ZERO: f32 = 800.0;

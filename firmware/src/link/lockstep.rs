@@ -23,7 +23,7 @@ pub const STEPS: u8 = 2;
 pub const REPORT: u8 = 3;
 /// A frame could not be understood.
 pub const DAMAGED: u8 = 0x7F;
-/// Most steps in a request.
+/// Largest number of steps in a request.
 pub const BATCH: usize = 32;
 
 /// Measurements of a case.
@@ -33,7 +33,7 @@ pub struct Report {
     pub steps: u32,
     /// Clock ticks in these steps.
     pub ticks: u64,
-    /// Most ticks in one step.
+    /// Largest number of ticks in one step.
     pub most: u32,
     /// Deepest stack so far, bytes.
     pub stack: u32,

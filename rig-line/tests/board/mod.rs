@@ -34,7 +34,7 @@ pub(crate) struct Hands {
     /// Air shut off by hand.
     pub(crate) no_air: Arc<AtomicBool>,
     pub(crate) pace: Pace,
-    /// The flow is the one that the board's model is of.
+    /// Whether the flow is that of the board's model.
     pub(crate) as_modelled: Arc<AtomicBool>,
     /// Added to the reading, counts.
     pub(crate) shift: Arc<AtomicU16>,
@@ -60,7 +60,7 @@ pub(crate) fn host(line: &UnixStream, hands: &Hands, bad: Option<Bad>, session: 
     Host::new(port, session, Some(hands.pace.clone()))
 }
 
-/// A line that does not come back.
+/// A line that cannot be reopened.
 pub(crate) fn gone() -> Result<Host, LineError> {
     Err(LineError::Gone("pulled".into()))
 }

@@ -57,7 +57,7 @@ where
     J: Memory<T>,
     <M::Effects as Effect<T>>::State: Clone,
 {
-    /// An unreachable reference is rejected, and the last one stays.
+    /// An unreachable reference is rejected, and the previous one stays.
     fn set_reference(&mut self, reference: f64) {
         let _ = self.tracking.set_reference(T::from_f64(reference));
     }

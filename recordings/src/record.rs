@@ -14,8 +14,8 @@ const LARGEST: f64 = 1e100;
 /// Shortest and longest sampling period, s: times are written to 12 decimals, a thousandth of the shortest.
 pub const PERIODS_S: [f64; 2] = [1e-9, 1e9];
 
-/// Most measured channels of a record, and the longest name of one, bytes: a row and the header of its file stay
-/// shorter than the longest line that is read.
+/// Largest number of measured channels of a record, and length of the longest channel name, bytes. With these limits
+/// the header and the rows of a file are shorter than the longest line that is read.
 const CHANNELS: (usize, usize) = (4096, 200);
 
 /// Use of a record.
@@ -341,7 +341,8 @@ impl Origin {
 }
 
 /// Variance of the rounding of records' readings y, the mean of Δ²/12 over the records, with Δ the smallest difference
-/// between two readings of a record, in the unit of y. 0 without records, and for a record whose readings are all equal.
+/// between two readings of a record, in the unit of y. 0 without records, and for a record whose readings are all
+/// equal.
 #[must_use]
 pub fn rounding_variance<'a>(records: impl Iterator<Item = &'a [f64]>) -> f64 {
     let (mut sum, mut count) = (0.0, 0.0);

@@ -54,7 +54,8 @@ impl Table {
         let mut columns = vec![Vec::new(); names.len()];
         let mut times = PrintedTimes::default();
         let mut lines = Vec::new();
-        // Memory of a row: its values, its line, and the last place of its time.
+        // Memory of a row: its values, its line number, and one unit in the last printed place of its time; 8 bytes
+        // each.
         let row = 8 * (names.len() as u64 + 2);
         while rows.advance()? {
             if lines.len() % CHECKED == 0 {

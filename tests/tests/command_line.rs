@@ -523,7 +523,7 @@ fn stress_warns_and_refuses_nothing() {
             "warning: on plants that are not consistent with the records",
             "LOST",
             "Robustness margin",
-            "only the model was tried",
+            "the law was tried only on the model",
         ],
     );
     assert!(path("c-margin.svg").exists() && path("c-loop.svg").exists());

@@ -21,7 +21,7 @@ fn on_then_off(on: usize, off: usize) -> Vec<f64> {
     u
 }
 
-/// y_ss(1) = Σb / (1 − Σa − Σc), over the inputs named.
+/// y_ss(1) = Σb / (1 − Σa − Σc), summed over the given inputs.
 fn steady(model: &Model, inputs: &[usize]) -> f64 {
     let lags = model.product_lags.len();
     let a: f64 = model.a.iter().sum();

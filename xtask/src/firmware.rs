@@ -55,14 +55,14 @@ impl Chosen {
                     let known = BOARDS.into_iter().find(|board| board == value);
                     chosen.board = Some(known.with_context(|| {
                         format!(
-                            "there is no board `{value}`; there are {}",
+                            "there is no board `{value}`; the boards are {}",
                             BOARDS.join(", ")
                         )
                     })?);
                 }
                 "--model" => chosen.model = Some(value.into()),
                 "--rig" => chosen.rig = Some(value.into()),
-                _ => bail!("unknown option {option}; there are --board, --model and --rig"),
+                _ => bail!("unknown option {option}; the options are --board, --model and --rig"),
             }
         }
         Ok(chosen)

@@ -20,7 +20,7 @@ pub(crate) const TASK: Task = Task {
 pub(crate) struct Outcome {
     /// Mean instructions of each case.
     pub(crate) cases: BTreeMap<String, f64>,
-    /// Most instructions of a sample of each case.
+    /// Largest number of instructions in a sample, for each case.
     pub(crate) most: BTreeMap<String, f64>,
     /// Deepest stack, bytes.
     pub(crate) stack: f64,
@@ -53,7 +53,7 @@ pub(crate) fn pil(arguments: &[String]) -> Result<Outcome> {
                 passed.extend([option, value]);
             }
             _ => bail!(
-                "unknown option {option}; there are --model, --periods, --case, --serial, --steps, --lose"
+                "unknown option {option}; the options are --model, --periods, --case, --serial, --steps, --lose"
             ),
         }
     }

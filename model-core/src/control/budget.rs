@@ -16,13 +16,13 @@ pub struct Switches {
 /// A limit on the mean air consumption.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Air {
-    /// Allowed long-run share of time with the valve open, in 1/1000; 1000 is no limit.
+    /// Allowed long-run share of time with the valve open, in 1/1000; 1000 means no limit.
     pub per_mille: u32,
-    /// Samples of continuous blowing beyond the allowed share that a full store of air permits.
+    /// Longest continuous blowing beyond the allowed share, from a full store of air, samples.
     pub saved: u32,
 }
 
-/// Both budgets; `None` is no limit.
+/// Both budgets; `None` means no limit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Budget {
     /// Budget of the valve.

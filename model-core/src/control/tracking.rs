@@ -451,8 +451,8 @@ mod tests {
         }
     }
 
-    /// Theory 3.1 and 3.3: the duty is u_eq = α·y*/(b + y*·Σc), and at 0.8 the
-    /// closing time binds: 2·(1 − u_eq)/m0 switches per sample, swing m0·α·y*.
+    /// Theory 3.1 and 3.3: the duty is u_eq = α·y*/(b + y*·Σc), and at 0.8 the shortest closed time limits the
+    /// switching: 2·(1 − u_eq)/m0 switches per sample, swing m0·α·y*.
     #[test]
     fn the_limit_cycle_is_that_of_the_formulae() {
         let alpha = 1.0 - 0.9938;

@@ -55,7 +55,7 @@ pub struct Parameter {
     pub sign: Sign,
     /// Value of the parameter if a model file does not contain it; `None` for a required parameter.
     pub left_out: Option<f64>,
-    /// Name of a parameter of the same effect that is larger by the physics; `None` if there is none.
+    /// Name of a parameter of the same effect that must physically be larger; `None` if there is none.
     pub below: Option<&'static str>,
 }
 
@@ -104,7 +104,7 @@ impl Parameter {
         }
     }
 
-    /// The parameter is smaller than `other` by the physics. A fit may cross this limit, so that it can reject the
+    /// The parameter must physically be smaller than `other`. A fit may cross this limit, so that it can reject the
     /// physics.
     #[must_use]
     pub const fn below(self, other: &'static str) -> Self {

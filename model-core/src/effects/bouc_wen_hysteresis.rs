@@ -36,7 +36,7 @@ impl<T: Real> Effect<T> for BoucWenHysteresis<T> {
     }
 }
 
-/// α is reported alone, because its factor's share depends on the loop.
+/// Only α is reported, because the size of the loop depends on the motion.
 fn alpha(parameters: &[f64]) -> (f64, &'static str) {
     let [_, _, _, alpha] = take(parameters);
     (alpha, "(alpha)")

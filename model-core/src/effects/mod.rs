@@ -149,7 +149,7 @@ macro_rules! catalogue {
                 None
             }
 
-            /// The place on its card: it leaves the signals of the other places unchanged.
+            /// The place on its card. An effect leaves the signals of the other places unchanged.
             #[must_use]
             pub const fn place(&self) -> Place {
                 match self {

@@ -11,7 +11,7 @@ use super::source::{Budget, Source, fault};
 use super::stamp::Stamp;
 use crate::error::{DataError, DataProblem, FilePlace, printable};
 
-/// Most cells of a row: as many columns as a spreadsheet has.
+/// Largest number of cells of a row: as many columns as a spreadsheet has.
 const WIDEST: usize = 16_384;
 /// Bytes of memory per line in addition to its text, and per cell: its value, its last place, and its copy in a
 /// record.

@@ -130,7 +130,7 @@ impl Mapping {
         let clock = times.clock(stated).map_err(|f| {
             let row = rows.get(f.row).copied().unwrap_or(f.row);
             let problem = match f.problem {
-                // A gap that was not filled is no multiple of the period.
+                // A gap that was not filled and is not a multiple of the period.
                 DataProblem::TimeGap { step, period, .. } if self.fill_gaps_s.is_some() => {
                     DataProblem::TimeUneven { step, period }
                 }

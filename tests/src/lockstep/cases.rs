@@ -108,7 +108,7 @@ pub fn at(periods_s: &[f64]) -> Result<Vec<Case>> {
     let mut cases = vec![Case::new("full", full).short()];
     for period_s in periods_s {
         let us = loop_period_us(*period_s)
-            .with_context(|| format!("a sample every {period_s} s is no loop"))?;
+            .with_context(|| format!("no loop runs with a sample every {period_s} s"))?;
         for (name, model) in slower(*period_s)? {
             cases.push(Case::new(&format!("{name}_{us}us"), model).short());
         }

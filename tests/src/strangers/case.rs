@@ -71,15 +71,15 @@ pub struct Right {
     pub edge_delay_samples: Option<[f64; 2]>,
     /// Value that the interval of the dead time measured by `delay` must contain, to half a sample.
     pub dead_time_samples: Option<f64>,
-    /// Most state lags.
+    /// Largest number of state lags.
     pub n1_at_most: Option<usize>,
-    /// Most product lags.
+    /// Largest number of product lags.
     pub n2_at_most: Option<usize>,
     /// Correct verdicts of `diagnose`; any if empty.
     pub verdicts: Vec<String>,
     /// Effects that may be named.
     pub names: Vec<String>,
-    /// Most terms of `discover`.
+    /// Largest number of terms of `discover`.
     pub terms_at_most: Option<usize>,
     /// Least FIT of `compare`, in percent.
     pub fit_at_least: Option<f64>,

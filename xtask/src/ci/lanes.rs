@@ -101,7 +101,7 @@ fn next(
 }
 
 impl Progress {
-    /// Whether the step has not started, its room is free, and all steps that it must follow have ended or were not
+    /// Whether the step has not started, its resource is free, and all steps that it must follow have ended or were not
     /// requested.
     fn is_ready(&self, step: &Step, chosen: &[&Step]) -> bool {
         let has_ended = |name: &str| self.done.iter().any(|done| done.name == name);

@@ -96,7 +96,7 @@ pub(crate) fn rig_day(arguments: &[String]) -> Result<()> {
             "--short" => form = &SHORT,
             "--brief" => form = &BRIEF,
             "--page" => page = true,
-            other => bail!("unknown option {other}; there are --short, --brief and --page"),
+            other => bail!("unknown option {other}; the options are --short, --brief and --page"),
         }
     }
     let Form {

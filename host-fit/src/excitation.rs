@@ -231,7 +231,7 @@ impl Excitation {
         {
             remarks.push(
                 "All on-times are equal and all off-times are equal: a slow effect (droop, drift, hysteresis) \
-                     is not distinguishable from the response itself. Add a record with other times.".into(),
+                     is not distinguishable from the response itself. Add a record with other on-times and off-times.".into(),
             );
         }
         if (self.lags_separated as f64) < RULES.separated * self.lags_tried as f64 {

@@ -117,7 +117,7 @@ impl Sums {
     }
 }
 
-/// The records on which an error is computed. Gives the error and the records their names in every text.
+/// The records on which an error is computed. It determines the names of the error and of the records in all texts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ErrorKind {
     /// On the records marked `validate`.

@@ -25,7 +25,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! The rooms, from top to bottom; each uses only those below it:
+//! The modules, from top to bottom; each uses only the modules below it:
 //!
 //! | room | does |
 //! |---|---|

@@ -15,7 +15,7 @@ pub struct FrequencyPoint {
     pub hz: f64,
     /// Magnitude: amplitude of y per full jet; above 0.
     pub gain: f64,
-    /// Phase of y before the command, degrees; negative for a lag. Continuous over frequency, dead time included.
+    /// Phase of y relative to the command, degrees; negative if y lags. Continuous over frequency, dead time included.
     pub phase: f64,
 }
 
@@ -188,7 +188,7 @@ impl Sums {
         self.run += u.conj() * run;
     }
 
-    /// Adds `other`, whose y is turned by `turn`.
+    /// Adds `other`, whose phase of y is changed by `turn`.
     fn include(&mut self, other: &Self, turn: Complex<f64>) {
         self.uu += other.uu;
         self.yy += other.yy;
@@ -227,14 +227,14 @@ impl Sums {
     }
 }
 
-/// Number of independent ones among `width` neighbouring lines under a Hann window.
+/// Number of independent lines among `width` neighbouring lines under a Hann window.
 fn independent(width: f64) -> f64 {
     let each = [1.0, 2.0].into_iter().zip(NEIGHBOURS);
     let shared = each.map(|(apart, squared)| f64::max(width - apart, 0.0) / width * squared);
     width / (1.0 + 2.0 * shared.sum::<f64>())
 }
 
-/// Turn of a dead time, degrees.
+/// Phase lag of a dead time, degrees.
 fn turned(hz: f64, dead_time: usize, period_s: f64) -> f64 {
     360.0 * hz * dead_time as f64 * period_s
 }

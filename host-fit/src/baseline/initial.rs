@@ -3,7 +3,7 @@
 use crate::linalg::dot;
 use std::ops::Range;
 
-/// Fewest samples of a record from which its initial state is estimated.
+/// Smallest number of samples of a record from which its initial state is estimated.
 const FEWEST: usize = 20;
 /// Share of a record from which its initial state is estimated.
 const SHARE: f64 = 0.05;

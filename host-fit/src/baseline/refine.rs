@@ -8,7 +8,7 @@ use super::starts::Start;
 use crate::linalg::{dot, solve_symmetric};
 use crate::order;
 
-/// Most Gauss–Newton steps.
+/// Largest number of Gauss–Newton steps.
 const STEPS: usize = 20;
 /// The iteration ends after a step that lowers the cost by less than this share.
 const CONVERGED: f64 = 1e-7;

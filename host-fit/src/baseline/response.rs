@@ -16,7 +16,7 @@ pub(super) enum Shape {
     Second {
         /// ω, radians a sample.
         frequency: f64,
-        /// ζ; below 1 the response swings.
+        /// ζ; below 1 the response overshoots.
         damping: f64,
     },
 }

@@ -15,7 +15,7 @@ const RECORDS: usize = 20;
 const DEAD_TIMES: usize = 150;
 /// Factor from one time scale to the next.
 const SCALE: usize = 4;
-/// The fewest thinned samples of the longest record.
+/// Smallest number of decimated samples of the longest record.
 const SHORTEST: usize = 60;
 /// Time constants of a scan, thinned samples, and further ones that only the coarsest scan tries.
 const TIMES: [f64; 5] = [0.5, 1.0, 2.0, 4.0, 8.0];

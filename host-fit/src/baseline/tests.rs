@@ -4,7 +4,7 @@ use super::*;
 use crate::data::{DataSet, Use};
 use std::path::{Path, PathBuf};
 
-/// Repeatable noise of standard deviation 1 (twelve uniform numbers).
+/// Repeatable noise of standard deviation 1: sums of twelve uniform numbers.
 struct Noise(u64);
 
 impl Noise {

@@ -24,7 +24,8 @@ pub enum BoardError {
     NoLaw,
     /// The jet blows at the lower command, but a board opens the valve with its output on.
     #[error(
-        "key `command`: a full jet is the lower command ({full:?}; {off:?} is no jet), but a board blows with its output on. Record u with 1 for a jet and 0 for none, and identify again."
+        "key `command`: the lower command ({full:?}) is a full jet and {off:?} is no jet, but a board blows when its \
+            output is on. Record u with 1 for a jet and 0 for none, and identify again."
     )]
     Inverted {
         /// The command of no jet.

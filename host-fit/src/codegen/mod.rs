@@ -51,7 +51,7 @@ pub enum CodegenError {
     },
     /// An effect is neither in the catalogue nor defined by the model.
     #[error(
-        "effect `{name}` has no Rust form: it is neither in the catalogue (`host-fit effects` lists it) \
+        "effect `{name}` cannot be written in Rust: it is neither in the catalogue (`host-fit effects` lists it) \
          nor defined by the model. Remove it from the model."
     )]
     UnknownEffect {
@@ -60,8 +60,8 @@ pub enum CodegenError {
     },
     /// An effect of the catalogue that can be generated in Rust only.
     #[error(
-        "effect `{name}` has no form in other languages than Rust. \
-         Write it with `--lang rust`, or give it a form in host-fit/src/user_effect/forms.toml."
+        "effect `{name}` can be written in Rust only. \
+         Use `--lang rust`, or add its definition to host-fit/src/user_effect/forms.toml."
     )]
     NoForm {
         /// Name of the effect.

@@ -29,7 +29,7 @@ pub(crate) struct Args {
     /// Longest delay to search: samples (250) or a time (0.25s) [default: what the records can show].
     #[arg(long, value_name = "TIME")]
     max_delay: Option<TimeSpan>,
-    /// Length of y on either side of the start of a response where each edge is measured by itself: samples
+    /// Length of y on either side of the start of a response, if each edge is measured separately: samples
     /// (30) or a time (0.03s) [default: three response times, or half the time between edges if that is
     /// less].
     #[arg(long, value_name = "TIME")]

@@ -68,7 +68,7 @@ pub(crate) struct Args {
     /// Price of steady blowing, in y: mean friction minus price times duty is maximised (maximising).
     #[arg(long, value_name = "Y", default_value_t = 0.0, value_parser = not_negative)]
     air_price: f64,
-    /// Most pulses in a period (maximising).
+    /// Largest number of pulses in a period (maximising).
     #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u8).range(1..=4))]
     pulses: u8,
     /// Horizon of an additional search over free on/off commands, in seconds (`2`, `500ms`) or samples
@@ -262,8 +262,8 @@ impl Args {
             Some(set) => steps::possible(model, set)?,
             None => {
                 notes.push(
-                    "only the model was tried: `host-fit design MODEL.toml DATASET` tries the law on every plant that is \
-                     consistent with the records"
+                    "the law was tried only on the model: `host-fit design MODEL.toml DATASET` tries the law on every \
+                     plant that is consistent with the records"
                         .to_owned(),
                 );
                 Vec::new()

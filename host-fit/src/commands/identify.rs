@@ -69,8 +69,8 @@ struct Request {
     /// Number of input delays N3 [default: 1; averaged: 2].
     #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u16).range(1..=20))]
     n3: Option<u16>,
-    /// Longest lag and input delay, in samples (`500`) or as a time (`0.5s`) [default: 500 samples, at most a quarter of
-    /// the shortest record].
+    /// Longest lag and input delay, in samples (`500`) or as a time (`0.5s`) [default: 500 samples, at most a quarter
+    /// of the shortest record].
     #[arg(long, value_name = "SAMPLES|TIME", value_parser = longest_lag)]
     max_lag: Option<TimeSpan>,
     /// Meaning of a lag τ: y_{k−τ} as printed in eq. (3), or y_{k+1−τ}.
@@ -79,7 +79,7 @@ struct Request {
     /// Objective of the search.
     #[arg(long, value_enum, default_value_t = Aim::FreeRun)]
     objective: Aim,
-    /// Most evaluations of the objective.
+    /// Largest number of evaluations of the objective.
     #[arg(long, value_name = "COUNT", default_value_t = 20_000, value_parser = clap::value_parser!(u64).range(1..))]
     evaluations: u64,
     /// Number of threads; the result does not depend on it.

@@ -172,7 +172,7 @@ impl Onlooker for Watch {
         if io::stderr().is_terminal() {
             self.bar.suspend(|| eprintln!("{text}"));
         } else {
-            // A closed pipe is no error.
+            // A closed pipe is not an error.
             let _ = self.console.say(&text);
         }
     }

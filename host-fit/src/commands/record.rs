@@ -53,8 +53,8 @@ pub(crate) struct Args {
     /// With `--calibrate`: settling time of the flow, s [default: 4, or 1000 samples where that is longer].
     #[arg(long, value_name = "SECONDS", value_parser = positive, requires = "calibrate")]
     steady: Option<f64>,
-    /// With `--calibrate`: pulses per length that is tried; fewer make the detection of short ones less
-    /// reliable.
+    /// With `--calibrate`: number of pulses per length that is tried; with fewer pulses the detection of a response to
+    /// short pulses is less reliable.
     #[arg(long, value_name = "COUNT", default_value_t = 24, value_parser = clap::value_parser!(u32).range(3..=10_000), requires = "calibrate")]
     pulses: u32,
     /// Acknowledge a latched fault, or disarm the law, first.
@@ -75,7 +75,7 @@ fn said(text: &str) -> Result<ChannelSaid, String> {
             zero_counts: number(zero)?,
             per_count: number(per_count)?,
         }),
-        _ => Err("four parts are needed, as in u_inf,m/s,0,0.005".into()),
+        _ => Err("four parts are needed: name, unit, counts at 0, units per count, as in u_inf,m/s,0,0.005".into()),
     }
 }
 
@@ -115,7 +115,7 @@ impl Words for Recorded {
                     first.period_s
                 )
             } else {
-                "next: host-fit average each with its own --period".into()
+                "next: run `host-fit average` on each recording, with the --period of that recording".into()
             });
         }
         lines.join("\n")

@@ -7,7 +7,7 @@ use rig_line::RigFile;
 pub(crate) fn rust(rig: &RigFile) -> String {
     let sensor = &rig.sensor;
     let mut text = format!(
-        "//! Constants of a rig. Generated from its rig.toml; measure the rig anew instead.\n\n\
+        "//! Constants of a rig. Generated from its rig.toml; to change them, calibrate the rig again.\n\n\
          /// Counts of the separated flow, y = 0.\n\
          pub const ZERO: f32 = {:?};\n\
          /// y per count.\n\
@@ -123,7 +123,7 @@ pub(crate) fn fits(rig: &RigFile, model: &Model) -> Result<(), String> {
         let counts = needed.reference / channel.per_count + channel.zero_counts;
         if !(channel.lower_rail_counts < counts && counts < channel.upper_rail_counts) {
             return Err(format!(
-                "`channel` and the model's reference of it: {} {} would read {counts:.0} counts, which is at an \
+                "`channel`: the model's reference, {} {}, would read {counts:.0} counts, which is at an \
                     end of the converter's range; check the unit",
                 needed.reference, channel.unit
             ));

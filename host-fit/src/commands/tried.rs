@@ -109,12 +109,14 @@ impl Tried {
         let decide = self.proof.cases.iter().filter(|case| case.group.decides());
         let (decide, lost) = (decide.count(), self.proof.lost());
         let mut text = if lost.is_empty() && decide == 1 {
-            "attachment is kept in the one deciding trial".to_owned()
+            "attachment is kept in the only trial that decides (the model)".to_owned()
         } else if lost.is_empty() {
-            format!("attachment is kept in all {decide} deciding trials")
+            format!(
+                "attachment is kept in all {decide} trials on plants that are consistent with the records"
+            )
         } else {
             format!(
-                "attachment is lost in {} of {decide} deciding trials: {}",
+                "attachment is lost in {} of {decide} trials on plants that are consistent with the records: {}",
                 lost.len(),
                 few(&lost)
             )

@@ -220,7 +220,8 @@ pub(super) fn words(
             all.count, RULES.tested_edges
         ),
         DelayVerdict::Fixed => format!(
-            "The law is not supported by these data: {}. A fixed delay of {:.1} samples (scatter of {} edges {:.1}) describes it.",
+            "The law is not supported by these data: {}. A fixed delay of {:.1} samples is sufficient (over {} edges \
+                the standard deviation is {:.1} samples).",
             match law_not_kept {
                 Some(reason) if tests.law.is_some_and(|p| p < RULES.significant) =>
                     reason.to_owned(),

@@ -122,13 +122,14 @@ impl DelayLawFit {
         let range = format!("ỹ from {:.3} to {:.3}", self.range.0, self.range.1);
         if least.is_nan() || least < 0.0 {
             return Some(
-                "it is negative at a ỹ within these data, but a delay cannot be negative"
+                "it is negative for some ỹ within these data, but a delay cannot be negative"
                     .to_owned(),
             );
         }
         if most > longest {
             return Some(format!(
-                "at a ỹ within these data it is longer than {longest:.0} samples, the longest that was searched"
+                "for some ỹ within these data it is longer than {longest:.0} samples, the longest delay that was \
+                    searched"
             ));
         }
         let error = self.quantile * standard_error;

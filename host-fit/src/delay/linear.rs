@@ -1,7 +1,7 @@
 //! A fit of one plant with a dead time to whole records.
 //!
-//! Every record is described by y = level + initial state + K·(response to u, delayed by h): the plant of [`Plant`], one
-//! gain K for all records, a level and a free initial state (one value for each order) per record. Gain, levels and
+//! Every record is described by y = level + initial state + K·(response to u, delayed by h): the plant of [`Plant`],
+//! one gain K for all records, a level and a free initial state (one value for each order) per record. Gain, levels and
 //! initial states are linear and eliminated exactly (variable projection); h, S and b are searched, on a grid over
 //! decimated records first, then by Levenberg–Marquardt on all samples. h is real, so its resolution is not that of the
 //! clock.
@@ -13,7 +13,7 @@ use crate::data::Record;
 use crate::linalg::{dot, dots, gram, solve_symmetric};
 use crate::order;
 
-/// Most samples for the grid search; longer records are decimated.
+/// Largest number of samples for the grid search; longer records are decimated.
 const COARSE_SAMPLES: usize = 2_000;
 /// Sums of time constants that the grid search tries, in steps of this factor.
 const COARSE_STEP: f64 = 1.5;

@@ -13,9 +13,9 @@ use super::pooled::Pooled;
 use super::rules::RULES;
 use super::spread::mean;
 
-/// Most edges used to estimate the time constants.
+/// Largest number of edges used to estimate the time constants.
 const SHAPE_EDGES: usize = 60;
-/// Fewest samples on either side of an arrival.
+/// Smallest number of samples on either side of an arrival.
 const LEAST_SIDE: f64 = 2.0;
 /// Ratios b that are tried in windows.
 const RATIOS: [f64; 6] = [0.0, 0.03, 0.08, 0.15, 0.25, 0.6];

@@ -23,7 +23,7 @@ use model_core::average::WINDOW;
 pub struct DelayOptions {
     /// W of the averaged output (1), samples; 250 in the paper and in every model that is fitted.
     pub window: u32,
-    /// Longest delay that is searched, samples. By default the longest that the records can show.
+    /// Longest delay that is searched, samples. By default the longest delay that these records can show.
     pub max_delay: Option<usize>,
     /// Samples of y used on either side of a response's start if each edge is located by itself. More samples
     /// reduce the noise; fewer suit faster responses. By default three response times, or half the time between

@@ -69,7 +69,7 @@ impl Certificate {
 const ERROR: f64 = 0.01;
 /// The iteration ends when the interval shrinks by less than this share. Each step is a valid bound.
 const SHRINKS: f64 = 1e-6;
-/// Most steps of the iteration.
+/// Largest number of steps of the iteration.
 const MOST: usize = 2000;
 
 /// The certificate of `law` on `model`.
@@ -220,11 +220,11 @@ impl Positive {
         for map in [&off, &on] {
             if map.weights.iter().any(|weight| *weight < 0.0) {
                 return Err(
-                    "a coefficient of the past is negative, so that the model is not monotone",
+                    "a past sample has a negative coefficient, so the model is not monotone",
                 );
             }
             if map.newest() <= 0.0 {
-                return Err("the newest sample has no weight");
+                return Err("the newest sample has no positive weight");
             }
             if map.newest() + map.older() >= 1.0 {
                 return Err("the model has no stable steady level");

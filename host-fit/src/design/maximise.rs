@@ -26,7 +26,7 @@ pub struct MaximiseRequest {
     pub min_off_s: f64,
     /// Price of steady blowing, y: the law maximises mean friction − price·duty.
     pub air_price: f64,
-    /// Most pulses in a period, 1–4.
+    /// Largest number of pulses in a period, 1–4.
     pub pulses: usize,
     /// Longest period, s; `None`: 3000 samples, at least 3 s.
     pub longest_period_s: Option<f64>,

@@ -103,7 +103,7 @@ pub(crate) fn held(model: &Model) -> Result<Held, DesignError> {
         });
     }
     let reachable = Reachable {
-        // A small remainder of the initial transient is no natural friction.
+        // A small remainder of the initial transient is not a natural friction.
         low: if natural.friction.abs() < RULES.no_natural * blown.friction {
             0.0
         } else {
@@ -249,7 +249,7 @@ pub fn track(model: &Model, request: &TrackRequest) -> Result<TrackDesign, Desig
             }
         }
     }
-    // A pace that saves air has its ripple on purpose.
+    // A switching rate that saves air accepts a larger ripple on purpose.
     if !request.least_air {
         law = anticipating(law, |law| Some(duty_of(law).ok()?.rms));
     }

@@ -299,8 +299,8 @@ mod tests {
     use std::sync::Mutex;
     use std::sync::atomic::AtomicBool;
 
-    /// Eight lags imitate a vortex behind every rising edge, with more parameters and less evidence. Neither a leaner
-    /// given model nor one with more evidence is an imitation.
+    /// Eight lags imitate a vortex behind every rising edge, with more parameters and less evidence. A given model with
+    /// fewer parameters, or with more evidence, is not an imitation.
     #[test]
     fn a_given_model_with_more_parameters_and_less_evidence_imitates() {
         let records = records(&["starting-vortex"], &[], 3);

@@ -58,7 +58,7 @@ pub enum DiagnoseError {
 /// Options of a diagnosis.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// Most effects added one after the other.
+    /// Largest number of effects added one after the other.
     pub most_effects: usize,
     /// Seed of the search for the command that distinguishes candidates.
     pub seed: u64,

@@ -63,7 +63,7 @@ impl Search<'_> {
             && let Some(other) = self.after_another_law(&found.best, &[])
             && other.judged.rmse() < below * reached
         {
-            (self.progress)("again with another delay law");
+            (self.progress)("fitting again with another delay law");
             let with_law = Model {
                 delay: other.judged.model().delay.clone(),
                 ..model.clone()

@@ -72,8 +72,9 @@ impl Session<'_> {
         self.without_what_lags_do(self.most_evident(found), &found.root)
     }
 
-    /// Replaces the best hypothesis while another one has more evidence: without one of its effects, refitted or found by
-    /// the search, or such a result of the search with the effect added.
+    /// Replaces the best hypothesis while another one has more evidence. For each effect three others are compared: the
+    /// best hypothesis refitted without the effect, the best result of the search without the effect, and that result
+    /// with the effect added.
     fn most_evident(&self, found: &Found) -> Hypothesis {
         let mut best = found.best.clone();
         let Some(likelihood) = Likelihood::of(self.judge(), best.judged.model()) else {
@@ -191,8 +192,9 @@ impl Session<'_> {
         let Some(certificate) = certificate else {
             return of_bare();
         };
-        // Above the noise level, an effect is missing if it explains most of what the given model leaves, or the best model
-        // without effects if that has a smaller error or the given one imitates the effect.
+        // Above the noise level, an effect is missing if it explains most of the unexplained variance of the reference
+        // model. The reference is the given model; it is the best model without effects if that has a smaller error or
+        // if the given model imitates the effect.
         let is_reference = as_given.rmse() < bare.judged.rmse() && !self.given_imitates(best);
         let without = match is_reference {
             true => as_given,
@@ -207,7 +209,7 @@ impl Session<'_> {
                 taken >= RULES.explained && judge.over_noise(best.judged.rmse()) <= TERMS.much
             }
         };
-        // Where a model without the effects is at the noise level already, the little that is left above it is uncertain.
+        // If a model without the effects is at the noise level already, its small error above the noise is uncertain.
         let least = match self.fits(&bare.judged) {
             true => RULES.most,
             false => RULES.stands_in,

@@ -45,7 +45,7 @@ pub(super) struct State {
     pub(super) update: String,
 }
 
-/// Time assumed since the last edge before the record, s at 1 kHz.
+/// Time assumed since the last edge before the record: 10 000 samples, i.e. 10 s at 1 kHz.
 const LONG_AGO_S: f64 = 10.0;
 /// Parameter name of a fitted filter time constant.
 pub(super) const FADING: &str = "fading_time";

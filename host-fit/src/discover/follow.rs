@@ -180,8 +180,8 @@ impl Finder<'_> {
         self.finished(tried)
     }
 
-    /// A model with the term, fitted for a few iterations; from 0 if the predicted values make the free run
-    /// diverge.
+    /// A model with the term, fitted for a few iterations. The fit starts with the term at 0 if its predicted values
+    /// make the free run diverge.
     fn fitted(&self, model: &Model, term: &Term) -> Option<Fit> {
         if self.search.interrupt.load(Ordering::Relaxed) {
             return None;

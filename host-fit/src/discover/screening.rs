@@ -28,7 +28,8 @@ pub(super) struct Screened {
 
 /// Above this level the command counts as on, inner units.
 pub(super) const ON: f64 = 0.5;
-/// Bounds of the flow's time constant, s at 1 kHz. The time constants of coordinates are multiples of the flow's.
+/// Bounds of the flow's time constant, s at 1 kHz (1000 samples). The time constants of coordinates are multiples of
+/// the flow's.
 const FASTEST_S: f64 = 0.005;
 const SLOWEST_S: f64 = 0.2;
 /// Factors on a found time constant for a finer grid around it.

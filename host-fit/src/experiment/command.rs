@@ -105,7 +105,8 @@ pub(super) fn families(limits: &Limits, rng: &mut ChaCha8Rng) -> Vec<Openings> {
                 rng.random_range(shortest..=shortest.max(longest))
             })
             .collect();
-        let name = format!("a random on/off sequence with dwells up to {longest:.3} s");
+        let name =
+            format!("a random on/off sequence with on-times and off-times up to {longest:.3} s");
         plans.push(Openings::repeating(name, limits, &dwells));
     }
     plans

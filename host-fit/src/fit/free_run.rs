@@ -23,7 +23,7 @@ const MANY: usize = 20;
 /// Options of a fit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FitOptions {
-    /// Most iterations.
+    /// Largest number of iterations.
     pub iterations: usize,
     /// Stop when an iteration lowers the sum of squares by less than this fraction.
     pub tolerance: f64,

@@ -18,7 +18,7 @@ const LEAST_DAMPING: f64 = 1e-9;
 /// negligible.
 const MORE_DAMPING: f64 = 6.0;
 const LARGEST_DAMPING: f64 = 1e8;
-/// Most steps tried from one linearisation.
+/// Largest number of steps tried from one linearisation.
 const TRIES: usize = 10;
 /// Added to the diagonal, so that a coordinate without influence does not move.
 const FLOOR: f64 = 1e-12;

@@ -120,7 +120,7 @@ pub(crate) fn check(records: &[&Record], structure: &Structure) -> Result<(), Id
     if structure.state_lags.max(structure.product_lags) > longest {
         return refuse(
             format!(
-                "{} lags do not fit into 1 … {longest}",
+                "{} different lags do not fit into 1 … {longest}",
                 structure.state_lags.max(structure.product_lags)
             ),
             "Give a larger --max-lag, or fewer lags with --n1 and --n2.",

@@ -23,7 +23,7 @@ pub(crate) fn exchange_predicted(
     Ok(settled(best, around))
 }
 
-/// Search step: walks the input delays.
+/// Search step: moves the input delays step by step.
 pub(crate) fn move_inputs(
     evaluator: &mut Evaluator<'_, FreeRun>,
     around: &Around<'_>,

@@ -34,7 +34,7 @@ pub(crate) fn refine(model: &mut Model, data: &[Record]) -> Option<Refinement> {
     let after = epsilon(&refined, &identify)?;
     let held_out = match validate.is_empty() {
         true => None,
-        // A model that diverges on validation records is no improvement.
+        // A model that diverges on validation records is not an improvement.
         false => Some((
             epsilon(model, &validate).unwrap_or(f64::INFINITY),
             epsilon(&refined, &validate).unwrap_or(f64::INFINITY),

@@ -103,10 +103,10 @@ pub(crate) struct Regression {
     pub(crate) lagged: LaggedOutputs,
     plain: Table,
     kept: BTreeMap<Which, Kept>,
-    /// Most tables that are kept.
+    /// Largest number of tables that are kept.
     most: usize,
     clock: u64,
-    /// Ticks of input delay that move about [`SAMPLES_PATCHED`] samples.
+    /// Change of an input delay, in ticks, that changes the arriving command at about [`SAMPLES_PATCHED`] samples.
     reach: u64,
     binary: bool,
 }

@@ -170,7 +170,7 @@ impl Model {
             ModelError::Syntax {
                 place: format!("{place}, line {line}"),
                 problem: format!(
-                    "{}. A model file is written by `host-fit identify`; compare with one of those.",
+                    "{}. Compare it with a model file that `host-fit identify` wrote.",
                     error.message()
                 ),
             }
@@ -332,7 +332,7 @@ impl File {
             if self.lag_convention == LagConvention::OneStep && lags.contains(&0) {
                 return wrong(
                     key,
-                    "a lag of 0 is the future; one-step lags begin at 1".into(),
+                    "a lag of 0 refers to the future; one-step lags begin at 1".into(),
                 );
             }
         }
@@ -425,7 +425,7 @@ impl EffectTable {
         }
         if spec.calibrated && self.reference.is_some_and(|r| !(r.is_finite() && r > 0.0)) {
             let problem =
-                "`reference` is the y at which the sensor was calibrated, a number above 0"
+                "`reference`, the y at which the sensor was calibrated, must be a number above 0"
                     .to_owned();
             return Err((key, problem));
         }

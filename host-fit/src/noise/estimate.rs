@@ -13,7 +13,7 @@ const MEMORIES: [f64; 7] = [2.0, 5.0, 12.0, 30.0, 80.0, 200.0, 500.0];
 const FINEST: f64 = 0.05;
 /// The first step if the search starts from the colour of similar errors.
 const NEAR: f64 = 0.25;
-/// Most EM iterations for the variances; the gains decrease.
+/// Largest number of EM iterations for the variances; the gains decrease.
 const ROUNDS: usize = 60;
 
 /// One record, with the quantities that every colour needs.

@@ -347,7 +347,7 @@ fn worst(tallies: &[Tally], samples: f64, single: bool) -> (usize, usize, Tally)
     (first, last, sum)
 }
 
-/// The interval of fewest samples with three quarters of the unexplained variance.
+/// The interval with the smallest number of samples that contains three quarters of the unexplained variance.
 fn concentration(
     tallies: &[Tally],
     ranges: &[(f64, f64)],

@@ -1,4 +1,4 @@
-//! Trend of the error after an edge with the dwell before the edge.
+//! Trend of the error after an edge with the dwell, the time between the edge and the edge before it.
 
 use super::Where;
 use super::explained::Errors;
@@ -9,7 +9,7 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 /// Correlation of the error after edges with the dwell before them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Trend {
-    /// Whether the dwell is a rest (before rising edges) or a blow.
+    /// Whether the dwell is a rest (before rising edges) or a pulse.
     pub rest: bool,
     /// Correlation of the error's size with the dwell, −1 to 1.
     pub correlation: f64,

@@ -21,7 +21,7 @@ const BLOCK: usize = 8;
 pub struct Snapshot {
     /// Evaluations so far.
     pub evaluations: usize,
-    /// Most evaluations allowed.
+    /// Largest number of evaluations allowed.
     pub budget: usize,
     /// Best value so far; infinite before the first finite value.
     pub best: f64,

@@ -5,7 +5,7 @@ use super::rules::RULES;
 /// Settings of a search.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
-    /// Most evaluations of the objective; cached points are free.
+    /// Largest number of evaluations of the objective; cached points are free.
     pub evaluations: usize,
     /// Seed of every random choice: the same seed gives the same result bit for bit.
     pub seed: u64,

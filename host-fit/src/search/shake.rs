@@ -23,7 +23,7 @@ pub struct Shake {
 }
 
 impl Shake {
-    /// Gives up after `patience` consecutive kicks without a success.
+    /// Ends after `patience` consecutive kicks without a success.
     pub fn new(patience: usize) -> Self {
         Self {
             patience,

@@ -39,8 +39,8 @@ pub trait SearchStep<P: Problem> {
         around: &mut Around<'_>,
     ) -> Result<Option<Success>, StopReason>;
 
-    /// Whether the step cannot improve a locally optimal incumbent any more. The search ends when all steps
-    /// have given up.
+    /// Whether the step cannot improve a locally optimal incumbent any more. The search ends when this is true of all
+    /// steps.
     fn has_given_up(&self) -> bool {
         true
     }

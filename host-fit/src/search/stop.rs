@@ -6,8 +6,8 @@ use core::fmt;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum StopReason {
-    /// The mesh was at one tick everywhere, every neighbour one tick away was
-    /// tried and was no better, and every search step had given up.
+    /// The mesh was at one tick everywhere, every neighbour one tick away was tried and is not better, and no search
+    /// step can find a better point.
     LocallyOptimal,
     /// The allowed number of evaluations was used up.
     EvaluationBudget,

@@ -50,7 +50,7 @@ pub struct IdentifyRequest {
     pub lags: LagConvention,
     /// Objective of the search.
     pub objective: Objective,
-    /// Most evaluations of the objective.
+    /// Largest number of evaluations of the objective.
     pub evaluations: usize,
     /// Number of threads; the result does not depend on it.
     pub threads: usize,

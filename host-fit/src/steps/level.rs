@@ -28,10 +28,10 @@ pub(super) fn beside_noise(all: &Indicators) -> String {
 const EXPECTED: f64 = 0.05;
 
 /// The residual test of an output-error model: the share of lags at which the cross-correlation of u and the residual
-/// lies outside its 95 % band. The autocorrelation is no test here, because measurement noise may be coloured.
+/// lies outside its 95 % band. The autocorrelation is not tested here, because measurement noise may be coloured.
 fn residual_test((_, cross): &(Correlation, Correlation), above_noise: bool) -> String {
     let small = match cross.outside > 2.0 * EXPECTED && !above_noise {
-        true => " The model lacks a response to u, which is smaller than the noise.",
+        true => " The model lacks a response to u that is smaller than the noise.",
         false => "",
     };
     format!(

@@ -371,8 +371,8 @@ fn records(answer: &mut Answer, diagnosis: &Diagnosis, judged_rmse: Option<f64>)
     }
     if let Some(scatter) = diagnosis.level_scatter {
         answer.note(format!(
-            "The level of y varies by {} % from record to record (`y_sd` grows with y); an error of that size along y counts \
-             as noise.",
+            "The level of y varies by {} % from record to record (`y_sd` grows with y); an error of this size that is \
+                proportional to y counts as noise.",
             significant(100.0 * scatter, 2)
         ));
     }

@@ -67,7 +67,7 @@ fn restarted(model: &Model, records: &[Record], reference: Option<&FirstOrder>) 
     let drifts = |samples: &usize| {
         let learning = || records.iter().filter(|record| record.role == Use::Identify);
         let cut = pieces_of(learning(), *samples);
-        // An integrator keeps the noise of its first sample: the mean of a whole run is no drift.
+        // An integrator keeps the noise of its first sample: the mean error of a whole run is not a drift.
         mean_square(model, learning(), true) > mean_square(model, cut.iter(), false)
     };
     restart_after(model, records).filter(|samples| !forgets && drifts(samples))

@@ -40,7 +40,7 @@ impl Hypothesis {
         self.terms.iter().all(|term| term.effect().is_none())
     }
 
-    /// Whether a term is at a bound of its range. Such a term imitates another, and is no result.
+    /// Whether a term is at a bound of its range. Such a term imitates another one and is not a result.
     pub(crate) fn reaches_a_bound(&self) -> bool {
         let model = self.judged.model();
         self.terms.iter().any(|term| term.is_at_a_bound(model))
@@ -125,7 +125,7 @@ mod tests {
         let vortex = |gain: f64| with("starting-vortex", &[gain, 0.02]);
         assert!(vortex(3.0).reaches_a_bound());
         assert!(!vortex(1.5).reaches_a_bound());
-        // A small amplitude is no bound.
+        // A small amplitude is not at a bound.
         assert!(!vortex(0.001).reaches_a_bound());
         let relay = |upper: f64, lower: f64| with("attachment-hysteresis", &[upper, lower, 0.2]);
         assert!(!relay(0.6, 0.3).reaches_a_bound());

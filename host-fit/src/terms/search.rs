@@ -344,7 +344,7 @@ impl Search<'_> {
             let enough = if added > 0 {
                 with >= RULES.with_effects * width
             } else {
-                // Lags move in a fit: neighbouring lags count as one proposal.
+                // A fit moves lags, so neighbouring lags count as one proposal.
                 without >= RULES.without_effects * width
                     || kept.iter().filter(again).count() >= RULES.of_one_kind
             };
@@ -577,17 +577,18 @@ pub(super) fn count_effects(terms: &[Term]) -> usize {
     terms.iter().filter(|term| term.effect().is_some()).count()
 }
 
-/// The index of the best result that is `wanted`; the root is always wanted.
+/// The index of the best result for which `wanted` is true; the root (index 0) if there is none.
 fn best(all: &[Hypothesis], wanted: impl Fn(&Hypothesis) -> bool) -> usize {
     leading(all, |i| wanted(&all[*i])).unwrap_or(0)
 }
 
-/// The index of the best result among those that are `wanted` by their index.
+/// The index of the hypothesis with the least score among those that are not at a bound and for whose index `wanted` is
+/// true.
 fn leading(all: &[Hypothesis], wanted: impl Fn(&usize) -> bool) -> Option<usize> {
     least_of(all, |i| !all[*i].bent && wanted(i))
 }
 
-/// The index of the hypothesis with the least score among those that are `wanted` by their index.
+/// The index of the hypothesis with the least score among those for whose index `wanted` is true.
 fn least_of(all: &[Hypothesis], wanted: impl Fn(&usize) -> bool) -> Option<usize> {
     (0..all.len())
         .filter(wanted)

@@ -18,7 +18,7 @@ pub enum Term {
     Product(u16),
     /// A second first-order lag in series, time constant in samples: a flow of second order.
     Inertia(f64),
-    /// A level-dependent rate of the flow; part of the base, not a missing effect.
+    /// A level-dependent rate of the flow; part of the base model, not a missing effect.
     LevelRate,
     /// A slow wake with this time constant (inner seconds): a memory of the flow.
     Wake(f64),
@@ -29,7 +29,7 @@ pub enum Term {
         /// Starting values of the parameters.
         parameters: Vec<f64>,
     },
-    /// The offset of the sensor; part of the base, no missing effect.
+    /// The offset of the sensor; part of the base model, not a missing effect.
     Offset,
     /// A physical effect, with starting values.
     Effect {

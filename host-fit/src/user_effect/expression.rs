@@ -257,7 +257,10 @@ impl Compiler {
             Some(Meaning::Read(op)) => Ok(self.push(op, Kind::Number)),
             None => {
                 let names: Vec<&str> = self.names.iter().map(|(name, _)| name.as_str()).collect();
-                let problem = format!("`{name}` is not known here; known are {}", names.join(", "));
+                let problem = format!(
+                    "`{name}` is not defined here; the defined names are {}",
+                    names.join(", ")
+                );
                 Err(Fault::at(span, problem))
             }
         }
@@ -346,7 +349,7 @@ impl Compiler {
                 .map(|(from, to)| (to - from, to as f32 > from as f32));
             let (Some((width, true)), Some(to)) = (width, to) else {
                 let place = arguments.get(2 * i + 3).map_or(span, |x| x.span());
-                let problem = "the positions of a table are numbers in ascending order";
+                let problem = "the positions of a table must be numbers in ascending order";
                 return Err(Fault::at(place, problem));
             };
             let mut number = |op: Op| self.builder.push(op);
@@ -408,7 +411,7 @@ fn expect(value: Typed, kind: Kind, place: Span) -> Result<Register, Fault> {
         return Ok(value.register);
     }
     let problem = format!(
-        "{} is needed here, this is {}",
+        "{} is needed here, but this is {}",
         kind.in_words(),
         value.kind.in_words()
     );

@@ -522,7 +522,7 @@ update = "reading"
             (
                 "reading + gian * u",
                 11,
-                "`gian` is not known here; known are u, y",
+                "`gian` is not defined here; the defined names are u, y",
             ),
             ("reading + gain % u", 16, "`%`"),
             ("reading + gain * u as f32", 20, "`as`"),
@@ -550,12 +550,12 @@ update = "reading"
             (
                 "if u { gain } else { 0.0 }",
                 4,
-                "a condition is needed here, this is a number",
+                "a condition is needed here, but this is a number",
             ),
             (
                 "gain + (u > 0.5)",
                 8,
-                "a number is needed here, this is a condition",
+                "a number is needed here, but this is a condition",
             ),
             ("if u > 0.5 { gain } else { 0.0 } * y", 1, "in parentheses"),
             ("let y = gain; y", 5, "is already defined"),

@@ -147,7 +147,7 @@ impl Source {
         let mut name = |label: String, name: &str, op: Op| {
             if !is_identifier(name) {
                 let problem = format!(
-                    "`{name}` is not a valid name: use at most 40 small letters, digits and `_`, no word of Rust"
+                    "`{name}` is not a valid name: use at most 40 small letters, digits and `_`, and no keyword of Rust"
                 );
                 return Err(Refusal::Key(label, problem));
             }

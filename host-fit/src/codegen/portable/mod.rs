@@ -31,7 +31,7 @@ pub enum Precision {
 /// precision.
 ///
 /// # Errors
-/// A number beyond single precision, or an effect without a form.
+/// A number beyond single precision, or an effect that can be written in Rust only.
 pub fn c(model: &Model, precision: Precision) -> Result<String, CodegenError> {
     check(model)?;
     Ok(match precision {

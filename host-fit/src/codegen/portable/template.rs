@@ -2,7 +2,8 @@
 //!
 //! - `@name@` is replaced by a text. Alone in its line it may have several lines, which get the indentation of the
 //!   hole, or none.
-//! - The lines between `@if name` and `@end` stand if the text `name` is not empty, those after `@else` if it is.
+//! - The lines between `@if name` and `@end` are kept if the text `name` is not empty; the lines after `@else` are kept
+//!   if it is empty.
 //! - The lines between `@for name` and `@end` are repeated for each row of the list `name`.
 
 use std::collections::BTreeMap;

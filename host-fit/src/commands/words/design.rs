@@ -116,7 +116,8 @@ fn optimum_words(optimum: &Optimum, period_s: f64) -> String {
     text.push('\n');
     text.push_str(&weighed_words(&optimum.weighed, law.period == 1));
     text.push_str(&format!(
-        "\nmean y after {} {:.3}, with the period 2 % off {:.3}; pole moduli {:.5} with the valve closed, {:.5} with it open",
+        "\nafter {}: mean y {:.3}; with a period that is 2 % off: mean y {:.3}; pole moduli {:.5} with the valve \
+            closed, {:.5} with it open",
         duration(RULES.long_until, period_s),
         optimum.mean_after_minutes,
         optimum.mean_detuned,
@@ -125,7 +126,7 @@ fn optimum_words(optimum: &Optimum, period_s: f64) -> String {
     ));
     if optimum.mean_detuned < 0.9 * optimum.mean {
         text.push_str(
-            "\nnote: the optimum sits on a sharp resonance of the model; try it on the rig first",
+            "\nnote: the optimum is at a sharp resonance of the model; test it on the rig first",
         );
     }
     if let Some(mean) = optimum.refused_mean {
@@ -301,7 +302,7 @@ fn is_shown(case: &Case, proof: &Proof) -> bool {
         || !alike.any(|other| other.figures.rms > rms && other.group != CaseGroup::Model)
 }
 
-/// The most characters of a trial's name in the table of a terminal.
+/// Largest number of characters of a trial's name in the table of a terminal.
 const NAME: usize = 44;
 
 fn case_table(proof: &Proof) -> String {

@@ -101,8 +101,8 @@ pub(crate) fn ladder_caption(ladder: &[Rung]) -> &'static str {
     }
 }
 
-/// `name value unit (low … high)`, or that it is not identifiable: its interval spans its whole range, or more than a
-/// factor.
+/// `name value unit (low … high)`, or that it is not identifiable: its interval spans its whole range, or more than the
+/// factor of the rule `diagnose.identified`.
 fn estimate_words(effect: &str, name: &str, p: &ParameterEstimate) -> String {
     let unit = if p.unit == "-" { "" } else { p.unit.as_str() };
     let space = if unit.is_empty() { "" } else { " " };

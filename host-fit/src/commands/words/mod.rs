@@ -154,7 +154,7 @@ fn beside_words(beside: &Beside) -> Vec<String> {
 fn refinement_words(refinement: &Refinement) -> String {
     let pair = |(before, after): (f64, f64)| format!("{} → {}", short(before), short(after));
     let mut text = format!(
-        "refined on the free run: identify ε {}",
+        "refined on the free run: estimation ε {}",
         pair(refinement.identify)
     );
     if let Some(validate) = refinement.validate {

@@ -104,10 +104,7 @@ impl Request {
         }
         match (read.command.needs_a_model(), read.model) {
             (true, None) => Err("`model` is missing: the number of a model".to_owned()),
-            (false, Some(_)) => Err(format!(
-                "`{}` does not start from a model",
-                read.command.name()
-            )),
+            (false, Some(_)) => Err(format!("`{}` accepts no `model`", read.command.name())),
             _ => Ok(read),
         }
     }

@@ -244,7 +244,7 @@ impl Task {
                 page.begins("designing, and trying the law in the loop");
                 let (model, data) = (self.model(bench)?, bench.data()?);
                 let tried = args.tried(&model, Some(&data.set)).map_err(told)?;
-                let refused = tried.refused("the box “keep it even if attachment is lost”");
+                let refused = tried.refused("the box “keep the law even if attachment is lost”");
                 if let Some(refused) = refused.filter(|_| !args.force()) {
                     return Err(Refusal(refused));
                 }

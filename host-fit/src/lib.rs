@@ -27,7 +27,7 @@
 //!
 //! The modules, from top to bottom; each uses only the modules below it:
 //!
-//! | room | does |
+//! | module | does |
 //! |---|---|
 //! | [`steps`] | the workflow, step by step, with the results as data |
 //! | [`codegen`], [`design`], [`extend`] | uses of a model: code generation, control laws, added effects |

@@ -1,5 +1,5 @@
-//! The architecture page agrees with the code: dependencies of crates have one direction, and rooms of the library
-//! use only the rooms below them.
+//! The architecture page agrees with the code: dependencies of crates have one direction, and modules of the library
+//! use only the modules below them.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -58,11 +58,11 @@ fn crates_know_what_the_picture_says() {
     }
 }
 
-/// The rooms in the order of the page, from top to bottom.
+/// The modules in the order of the page, from top to bottom.
 fn rooms() -> Vec<String> {
     let page = read("docs/architecture.md");
     let (_, table) = page
-        .split_once("## The rooms of the library")
+        .split_once("## The modules of the library")
         .expect("the heading");
     let (table, _) = table.split_once("\n## ").expect("a next heading");
     let rows = table.lines().filter_map(|line| line.strip_prefix("| `"));
@@ -70,7 +70,7 @@ fn rooms() -> Vec<String> {
         .collect()
 }
 
-/// Sources of a room without unit tests and test files.
+/// Sources of a module without unit tests and test files.
 fn sources(path: &Path) -> Vec<(PathBuf, String)> {
     if path.is_dir() {
         let entries = std::fs::read_dir(path).expect("a folder");
@@ -102,7 +102,7 @@ fn used(code: &str) -> Vec<String> {
                 .collect()
         };
         match rest.strip_prefix('{') {
-            // One level is enough: names after a comma in nested braces are not rooms.
+            // One level is enough: names after a comma in nested braces are not modules.
             Some(list) => names.extend(list.split(';').next().unwrap_or("").split(',').map(name)),
             None => names.push(name(rest)),
         }
@@ -130,7 +130,7 @@ fn rooms_use_the_rooms_below_them() {
             folder.with_extension("rs")
         };
         for (file, code) in sources(&path) {
-            // A file of tests may use any room.
+            // A file of tests may use any module.
             if file.ends_with("residual/plants.rs") {
                 continue;
             }

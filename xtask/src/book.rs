@@ -251,7 +251,7 @@ fn page(effect: &Effect, simulated: Option<&str>) -> String {
 fn base_terms(terms: &[Effect]) -> String {
     let mut text = format!(
         "# Terms of base models\n\n{MADE}\n`identify` adds one of these terms if it lowers the validation \
-             error; `diagnose` never reports them as missing. `host-fit effects NAME` prints one.\n"
+             error; `diagnose` never reports them as missing. `host-fit effects NAME` prints a single term.\n"
     );
     for term in terms {
         let _ = write!(

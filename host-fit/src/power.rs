@@ -127,9 +127,9 @@ impl Asked {
         (scatter + wanted.sqrt()).max(self.deviations * left.deviation) / left.energy
     }
 
-    /// The factor on the amplitude at which the effect is detected: `margin` times the factor that passes with as many
-    /// unnamed terms in the model as lower the error enough. A pair of terms may lower the error although a single one
-    /// does not: two neighbouring lags imitate an echo.
+    /// The factor on the amplitude at which the effect is detected: the rule `margin` times the factor that passes the
+    /// threshold. The model has every unnamed term that lowers the error by more than its penalty. A pair of terms may
+    /// lower the error although a single one does not: two neighbouring lags imitate an echo.
     fn multiple(&self, shown: &Shown) -> f64 {
         let (mut x, mut beside) = (0.0_f64, 0);
         while let Some(left) = shown.beside.get(beside) {

@@ -400,7 +400,7 @@ mod tests {
         // Two flows in parallel, each with its part of the jet.
         let [_, released] = self::motion(Grading::Proportional, 0.4);
         assert!((released + 0.6 * 0.02 * 0.3).abs() < 1e-12);
-        // One flow with an intermediate rate: 0.6 of 0.02 plus 0.4 of 0.05.
+        // One flow with an intermediate rate, 0.6 × 0.02 + 0.4 × 0.05.
         let [motion, released] = self::motion(Grading::Interpolated, 0.4);
         assert!((released - motion * 0.012 / 0.032).abs() < 1e-12);
         // Either flow.

@@ -13,7 +13,7 @@ use super::time_span::TimeSpan;
 /// Measure the delay of the response to every edge of the command, and fit the law h = p0 + p1·exp(−p2·ỹ).
 ///
 /// One plant of first or second order with dead time is fitted to all records. If it fits, the delay of an
-/// edge is its shift on that trajectory; otherwise the start of each response is located by itself. The law
+/// edge is its shift on that trajectory; otherwise the start of each response is located separately. The law
 /// is fitted to the identify records. It is rejected if it is not a valid delay on all records or not better
 /// than a constant.
 ///

@@ -472,7 +472,7 @@ fn a_coarse_converter_does_not_hide_the_dead_time() {
     });
 }
 
-/// No response ends before the next edge, so that no edge is measured by itself.
+/// No response ends before the next edge, so that no edge is measured separately.
 #[test]
 fn a_binary_sequence_has_a_dead_time() {
     for seed in 0..6 {

@@ -24,7 +24,7 @@ rules! {
     /// With a slow disturbance, one plant describes the records if the dead times of single edges scatter by no more
     /// than this factor times their standard errors.
     scatter_allowed: f64 = 2.0, "times the standard error", "0.5 and 0.7 on two records of a drifting temperature; 3.2 and 3.5 on data/hidden-ramp and data/paper-like, whose delay depends on y";
-    /// An edge needs this many samples on either side to be located by itself; with fewer, the time constants
+    /// An edge needs this many samples on either side to be located separately; with fewer, the time constants
     /// of all edges are used.
     fewest_reach: usize = 12, "samples", "judgement: twice the fewest samples on either side of an arrival";
     /// Half width of the window around an arrival: this many response times, or half the time between edges if that
@@ -96,6 +96,7 @@ rules! {
     clock: f64 = 0.5, "samples", "judgement: an interval of at least ± 1 sample; tested in `dead_time.rs` on tests/data/strangers";
     /// Edges per record on which the sensitivity to `reach` is measured.
     settings_edges: usize = 12, "edges", "judgement: more edges would triple the time on long records";
-    /// The dead time is averaged over ratios of the time constants up to this far on either side of the best one.
+    /// The dead time is averaged over ratios of the time constants up to this many grid steps on either side of the
+    /// best ratio.
     ratios: usize = 10, "", "steps of at most 30 %";
 }

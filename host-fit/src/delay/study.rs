@@ -25,7 +25,7 @@ pub struct DelayOptions {
     pub window: u32,
     /// Longest delay that is searched, samples. By default the longest delay that these records can show.
     pub max_delay: Option<usize>,
-    /// Samples of y used on either side of a response's start if each edge is located by itself. More samples
+    /// Samples of y used on either side of a response's start if each edge is located separately. More samples
     /// reduce the noise; fewer suit faster responses. By default three response times, or half the time between
     /// edges if that is less.
     pub reach: Option<usize>,
@@ -50,7 +50,7 @@ impl Default for DelayOptions {
 pub enum DelayMethod {
     /// One plant is fitted to whole records; the delay of an edge is found by shifting the edge in this fit.
     Trajectory,
-    /// Each edge is located by itself, where the slope of y changes.
+    /// Each edge is located separately, where the slope of y changes.
     Kink,
     /// Each edge in its own window with the common time constants: for records with few samples between
     /// edges.
@@ -136,7 +136,7 @@ pub struct DelayStudy {
     pub method: DelayMethod,
     /// Longest delay that was searched, samples.
     pub max_delay: usize,
-    /// Samples of y on either side of a response, where each edge was located by itself.
+    /// Samples of y on either side of a response, where each edge was located separately.
     pub reach: usize,
     /// The plant of the response; `None` if no plant fits.
     pub plant: Option<ResponsePlant>,
@@ -277,7 +277,7 @@ impl Measurement {
                 time_constants_off: pooled.plant.sum[1],
                 ratio: pooled.plant.ratio,
             }),
-            // Under a binary sequence no edge is measured by itself, but all together are.
+            // Under a binary sequence no edge is measured separately, but all together are.
             dead_time: (method == DelayMethod::Trajectory && pooled.responds)
                 .then_some(pooled.dead_time),
             common,

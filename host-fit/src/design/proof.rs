@@ -146,7 +146,7 @@ impl Proof {
 /// The plants of the trials beside the model.
 #[derive(Clone, Copy, Debug)]
 pub struct Trials<'a, F> {
-    /// Flows that the records leave possible.
+    /// Flows that are consistent with the records.
     pub possible: &'a [PossibleFlow],
     /// Flows under stress.
     pub stress: &'a [Trial<F>],

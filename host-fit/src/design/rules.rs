@@ -69,7 +69,7 @@ rules! {
     paces: [f64; 6] = [40.0, 20.0, 10.0, 6.0, 4.0, 3.0], "switches in 1000 samples", "a grid";
     /// A slower switching rate is chosen if it saves at least this much air.
     worthwhile_saving: f64 = 0.01, "share of the air", "judgement";
-    /// A slower switching rate is chosen only if the mean stays within this of the reference.
+    /// A slower switching rate is chosen only if the mean differs from the reference by at most this.
     paced_offset: f64 = 0.005, "share of the reachable interval", "judgement";
     /// On the model the air budget may be exceeded by this share.
     air_margin: f64 = 0.02, "share of the air of steady blowing", "judgement";
@@ -138,7 +138,8 @@ rules! {
     same_mean: f64 = 0.05, "share of the mean", "judgement";
     /// A motion whose range exceeds the scored range by more than half, or by more than this, is another motion.
     same_range: f64 = 0.25, "y", "judgement";
-    /// The value of an optimum is the lowest on flows that are slower and faster by the inverse of this.
+    /// The value of an optimum is the lowest value over the train itself and trains with a longer and a shorter period.
+    /// Their periods differ by 1 divided by this number.
     detuned: u32 = 50, "samples", "judgement: a resonance sharper than 2 % does not survive on a rig";
     /// Longest period of a pulse train.
     longest_period: usize = 3000, "samples", "six times the longest lag of an identification";

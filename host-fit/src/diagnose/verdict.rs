@@ -27,7 +27,7 @@ impl Session<'_> {
                 && judge.over_noise(held_out.rmse()) <= RULES.floor_margin)
     }
 
-    /// Whether `lesser` with a second copy of one of its `effects` fits equally well as `best`, which has one
+    /// Whether `lesser` with a second copy of one of its `effects` fits the records as well as `best`, which has one
     /// effect more. An effect whose equation differs from the catalogue's can look like two copies of it.
     pub(super) fn does_as_well_twice(
         &self,

@@ -10,7 +10,7 @@ pub enum Coordinate {
     Y,
     /// The sensor's reading before the term.
     Reading,
-    /// y before this time.
+    /// y this long ago, s.
     PastY(f64),
     /// Mean of y over this time.
     MeanY(f64),

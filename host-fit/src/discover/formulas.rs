@@ -56,7 +56,7 @@ impl Finder<'_> {
         current.terms = terms;
     }
 
-    /// The shortest formula that fits equally well as the curve in a model.
+    /// The shortest formula that fits the records as well as the curve in a model.
     pub(super) fn formula(&self, curve: &Term, with_curve: &Judged) -> Option<(Term, Judged)> {
         let judge = self.search.judge;
         let model = with_curve.model();

@@ -180,7 +180,7 @@ fn maximised(summaries: &[Summary], kept: [bool; EFFECTS], least: f64) -> Best {
     let square: f64 = summaries.iter().map(|s| s.square).sum();
     let floor = |scale: f64| scale.max(least).max(f64::MIN_POSITIVE);
     let mut scale = floor(square / samples.max(1.0));
-    // Initial values: each random effect estimated by itself.
+    // Initial values: each random effect estimated separately.
     let mut variances: [f64; EFFECTS] = std::array::from_fn(|i| {
         let each = summaries.iter().filter(|s| s.gram[i][i] > 0.0);
         let shown: f64 = each.map(|s| (s.products[i] / s.gram[i][i]).powi(2)).sum();

@@ -118,7 +118,7 @@ const SYMPTOMS: [Symptom; 23] = [
         .shown("a rate of change that depends on the cube of y")
         .check("repeat one pulse train at several free-stream velocities"),
     of("bouc-wen-hysteresis")
-        .shown("a smooth hysteresis loop between y and its restoring rate")
+        .shown("a smooth hysteresis loop between y and the rate at which y returns to its level")
         .check("raise and lower the duty cycle slowly and compare the levels of y")
         .confused("`attachment-hysteresis`: small loops inside the large one distinguish them."),
     of("dry-friction")

@@ -44,7 +44,7 @@ rules! {
     /// Proposals with effects that are refitted per model and round.
     with_effects: usize = 5, "", "the true effect was among the first three on 80 rigs of six families";
     /// Proposals without effects that are refitted per model and round.
-    without_effects: usize = 4, "", "a level-dependent rate was the fourth best after lags";
+    without_effects: usize = 4, "", "a level-dependent rate was the fourth best proposal, behind lags";
     /// Largest number of refitted proposals without effects that are of one kind.
     of_one_kind: usize = 2, "", "judgement: the fit can move the lags";
     /// Number of proposals that are refitted in full, of those fitted for a few iterations.
@@ -156,7 +156,8 @@ rules! {
     fewest_pieces: usize = 8, "", "judgement: the scatter of fewer pieces is uncertain by more than a third";
     /// Bootstrap resamples of the validation samples: records first, then blocks.
     resamples: usize = 400, "", "the shares are then accurate to 0.025";
-    /// A model is excluded if it wins less often than the best by more than this over √2.
+    /// A model is excluded if its share of won resamples is smaller than the share of the best model by more than this
+    /// value divided by √2.
     inflation: f64 = 0.1, "share of the resamples", "the ε of the inflated argmax (Adrian, Soloff and Willett, arXiv 2410.18268)";
     /// Largest number of folds of a cross-validation.
     most_folds: usize = 4, "", "judgement: limits the time";

@@ -234,7 +234,7 @@ pub enum Needs {
     DeadTime,
 }
 
-/// Dead time, in samples, up to which a response of the flow could be one of the sensor.
+/// Dead time, in samples, up to which a response of the flow could be mistaken for a direct response of the sensor.
 const AT_ONCE: f64 = 2.0;
 
 impl Needs {

@@ -198,8 +198,8 @@ fn clocks_do_not_matter() {
     }
 }
 
-/// Scaling y and the parameters according to their units gives the same run. King's law assumes a friction of
-/// 0 to 1.
+/// Scaling y and the parameters according to their units gives the same run. King's law is left out, because it assumes
+/// a friction of 0 to 1.
 #[test]
 fn units_of_y_do_not_matter() {
     for spec in effects().filter(|spec| spec.name != super::HotFilmNonlinearity::<f64>::SPEC.name) {

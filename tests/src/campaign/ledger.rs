@@ -164,7 +164,7 @@ fn play_all<C: Sync, R: Entry>(
     })
 }
 
-/// The results of a file by key; the last one counts. An unreadable line, for example the last one of a
+/// The results of a file by key; the last one counts. A case with an unreadable line, for example the last line of a
 /// killed campaign, is run again.
 fn read<R: Entry>(path: &Path) -> anyhow::Result<BTreeMap<String, R>> {
     let mut rows = BTreeMap::new();

@@ -1,5 +1,5 @@
-//! The models that a board runs in lockstep: base, averaged, laws, user effects, discovered terms, and every
-//! effect of the catalogue by itself.
+//! The models that a board runs in lockstep: base, averaged, laws, user effects, discovered terms, and every effect of
+//! the catalogue alone.
 
 use anyhow::{Context, Result};
 use host_fit::codegen::generate;

@@ -319,7 +319,7 @@ impl Args {
         self.goal == Goal::Track
     }
 
-    /// Whether a law is written although a deciding trial loses attachment.
+    /// Whether a law is written although it loses attachment on a plant consistent with the records.
     pub(super) fn force(&self) -> bool {
         self.force
     }

@@ -95,7 +95,7 @@ pub struct Proof {
 }
 
 impl Proof {
-    /// Names of the deciding trials in which attachment was lost.
+    /// Names of the trials on plants consistent with the records in which attachment was lost.
     #[must_use]
     pub fn lost(&self) -> Vec<String> {
         self.lost_where(CaseGroup::decides)

@@ -302,12 +302,12 @@ pub fn law_margin(design: &Design, seed: u64, planes: bool) -> Option<Margin> {
     Some(margin(&design.model, law, noise, seed, planes))
 }
 
-/// Whether a law for a target passes all deciding trials.
+/// Whether a law for a target passes all trials on plants consistent with the records.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TargetVerdict {
     /// The target, in the sensor's units.
     pub target: f64,
-    /// Whether the law passes all deciding trials.
+    /// Whether the law passes all trials on plants consistent with the records.
     pub passes: bool,
     /// Reason of a failure: the trials that lose attachment, or the error of the design.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -118,42 +118,65 @@ impl Session<'_> {
     }
 
     /// `best` without the effects that additional lags replace equally well. Lags are searched again together with
-    /// the other effects, because the present lags were found with all effects in the model. Skipped if the noise
-    /// level is unknown, because the error is then not informative.
+    /// the other effects, because the present lags were found with all effects in the model. An effect that lags do not
+    /// replace in a larger model is not tested again in a smaller one. Skipped if the noise level is unknown, because the
+    /// error is then not informative.
     fn without_what_lags_do(&self, mut best: Hypothesis, root: &Hypothesis) -> Hypothesis {
         if self.judge().noise_source == NoiseSource::Scatter {
             return best;
         }
-        while best.terms.iter().filter_map(Term::effect).count() > 1 {
-            let enough = (1.0 + RULES.worthwhile) * best.judged.rmse();
-            let named = (0..best.terms.len()).filter(|i| best.terms[*i].effect().is_some());
-            let lesser = named.filter_map(|index| {
-                let name = best.terms[index].name();
+        let effects = |of: &Hypothesis| of.terms.iter().filter_map(Term::effect).count();
+        let mut open: Vec<&'static str> = best
+            .terms
+            .iter()
+            .filter_map(Term::effect)
+            .map(|spec| spec.name)
+            .collect();
+        while effects(&best) > 1 && !open.is_empty() {
+            let lesser = open.iter().filter_map(|name| {
                 (self.search.progress)(&format!("testing lags instead of {name}"));
-                let lesser = self.search.without(&best, index, root)?;
-                let is_effect = |term: &Term| term.effect().is_some();
-                let (kept, lags) = lesser.terms.into_iter().partition(is_effect);
-                let mut from = Hypothesis::new(lesser.judged);
-                from.terms = lags;
-                // Lags with many more parameters than the effect are no simpler explanation.
-                let bases = Search {
-                    effects: false,
-                    most_parameters: from.cost() + best.terms[index].cost() + TERMS.head_start,
-                    known: self.search.known.clone(),
-                    ..*self.search
-                };
-                let mut found = bases.run(from, None).best;
-                let mut terms: Vec<Term> = kept;
-                terms.append(&mut found.terms);
-                found.terms = terms;
-                (found.judged.rmse() <= enough && !found.reaches_a_bound()).then_some(found)
+                Some((*name, self.with_lags_instead(&best, name, root)?))
             });
-            match lesser.min_by(|a, b| a.score().total_cmp(&b.score())) {
-                Some(lesser) => best = lesser,
-                None => break,
-            }
+            let lesser: Vec<(&str, Hypothesis)> = lesser.collect();
+            open = lesser.iter().map(|(name, _)| *name).collect();
+            let by_score =
+                |a: &(_, Hypothesis), b: &(_, Hypothesis)| a.1.score().total_cmp(&b.1.score());
+            let Some((dropped, with_lags)) = lesser.into_iter().min_by(by_score) else {
+                break;
+            };
+            best = with_lags;
+            open.retain(|name| *name != dropped);
         }
         best
+    }
+
+    /// `best` with additional lags instead of the effect `name`, if its error is as small.
+    fn with_lags_instead(
+        &self,
+        best: &Hypothesis,
+        name: &str,
+        root: &Hypothesis,
+    ) -> Option<Hypothesis> {
+        let is_named = |term: &Term| term.effect().is_some_and(|spec| spec.name == name);
+        let index = best.terms.iter().position(is_named)?;
+        let lesser = self.search.without(best, index, root)?;
+        let is_effect = |term: &Term| term.effect().is_some();
+        let (kept, lags) = lesser.terms.into_iter().partition(is_effect);
+        let mut from = Hypothesis::new(lesser.judged);
+        from.terms = lags;
+        // Lags with many more parameters than the effect are no simpler explanation.
+        let bases = Search {
+            effects: false,
+            most_parameters: from.cost() + best.terms[index].cost() + TERMS.head_start,
+            known: self.search.known.clone(),
+            ..*self.search
+        };
+        let mut found = bases.run(from, None).best;
+        let mut terms: Vec<Term> = kept;
+        terms.append(&mut found.terms);
+        found.terms = terms;
+        let enough = (1.0 + RULES.worthwhile) * best.judged.rmse();
+        (found.judged.rmse() <= enough && !found.reaches_a_bound()).then_some(found)
     }
 
     /// The verdict on `best` compared with the best model without effects, which may be the given one.

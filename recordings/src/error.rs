@@ -267,7 +267,7 @@ pub enum DataProblem {
     },
     /// The sampling periods from the times and as stated differ.
     #[error(
-        "the times of the rows are {found} s apart, but {by} {stated} s; correct the wrong one"
+        "the times of the rows are {found} s apart, but {by} {stated} s; correct the value that is wrong"
     )]
     PeriodMismatch {
         /// Sampling period from the time column, s.
@@ -307,7 +307,7 @@ pub enum DataProblem {
     },
     /// An invalid sampling period.
     #[error(
-        "the sampling period is {0:?}; it must be a number of seconds above 0, from 1e-9 to 1e9; look for the unit of the times"
+        "the sampling period is {0:?}; it must be a number of seconds above 0, from 1e-9 to 1e9; check the unit of the times"
     )]
     BadPeriod(f64),
     /// Times so large that double precision does not resolve the samples.

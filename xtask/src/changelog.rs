@@ -45,7 +45,7 @@ fn changelog(root: &Path, arguments: &[String]) -> Result<()> {
     let text = fs::read_to_string(&path).context("CHANGELOG.md")?;
     ensure!(
         !text.contains(&format!("{NEWEST}{version}]")),
-        "CHANGELOG.md has a release {version}"
+        "CHANGELOG.md already has a release {version}"
     );
     let at = text.find(NEWEST).unwrap_or(text.len());
     let (head, rest) = text.split_at(at);

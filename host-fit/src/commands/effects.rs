@@ -9,7 +9,7 @@ use super::effect_names::EffectName;
 use super::words::{Words, effect_table};
 
 /// Base terms that are lags of the recursion and have no card in the catalogue.
-const FLOW_TERMS: &str = "flow-lag         flow   a second lag in series: T2·q̇ = u − q replaces u in the \
+const FLOW_TERMS: &str = "flow-lag         flow   a second lag in series: T2·q̇ = u − q; q replaces u in the \
                           recursion\nflow-memory      flow   a later lag of y: a·y(t − T) is added to the \
                           recursion";
 

@@ -79,7 +79,7 @@ pub(crate) fn fits(rig: &RigFile, model: &Model) -> Result<(), String> {
         return Err(format!(
             "`sensor` and the model's training range: y from {least:.3} to {most:.3} was recorded, but this \
             rig's converter covers {low:.3} to \
-             {high:.3}; the model belongs to another rig or divider: calibrate again, or identify on this \
+             {high:.3}; the model belongs to another rig or voltage divider: calibrate again, or identify on this \
              rig"
         ));
     }

@@ -139,8 +139,8 @@ rules! {
     /// A motion whose range exceeds the scored range by more than half, or by more than this, is another motion.
     same_range: f64 = 0.25, "y", "judgement";
     /// The value of an optimum is the lowest value over the train itself and trains with a longer and a shorter period.
-    /// Their periods differ by 1 divided by this number.
-    detuned: u32 = 50, "samples", "judgement: a resonance sharper than 2 % does not survive on a rig";
+    /// These periods differ from that of the train by 1 / this number of it.
+    detuned: u32 = 50, "", "judgement: a resonance sharper than 2 % does not survive on a rig";
     /// Longest period of a pulse train.
     longest_period: usize = 3000, "samples", "six times the longest lag of an identification";
     /// Periods of the first grid of pulse trains.

@@ -42,8 +42,8 @@ rules! {
          the four right ones explained 0.72 to 1.00, the two wrong ones 0.56 and 0.62";
     /// An effect is a surrogate if the interval of each of its positive parameters spans more than this factor, or if the
     /// interval of its amplitude contains 0: the records do not determine it.
-    identified: f64 = 50.0, "times", "judgement; the interval of a wrong hysteresis beside an edge-dependent \
-         delay spanned a factor of 180; no interval of 24 right names in published flows and pairs spanned so much";
+    identified: f64 = 50.0, "times", "judgement; in a model with an edge-dependent delay, the interval of a wrong \
+         hysteresis spanned a factor of 180; among 24 right names in published flows and pairs none spanned so much";
     /// Where the level of slow noise is unknown, a model error is significant if this share of it is a function of
     /// a coordinate.
     depends: f64 = 0.1, "share of the model error above the noise", "the public sets";

@@ -155,7 +155,7 @@ const SYMPTOMS: [Symptom; 23] = [
              warming up distinguishes them.",
         ),
     of("electrical-pickup")
-        .shown("a share of the command in the reading without any delay")
+        .shown("a share of the command in the reading, delayed by at most two samples")
         .check("play the command with the air shut off: the reading still follows it"),
     of("sensor-saturation")
         .shown("a reading with a fixed limit")

@@ -44,7 +44,7 @@ rules! {
     /// Proposals with effects that are refitted per model and round.
     with_effects: usize = 5, "", "the true effect was among the first three on 80 rigs of six families";
     /// Proposals without effects that are refitted per model and round.
-    without_effects: usize = 4, "", "a level-dependent rate was the fourth best proposal, behind lags";
+    without_effects: usize = 4, "", "a level-dependent rate was the fourth best candidate, after lags";
     /// Largest number of refitted proposals without effects that are of one kind.
     of_one_kind: usize = 2, "", "judgement: the fit can move the lags";
     /// Number of proposals that are refitted in full, of those fitted for a few iterations.

@@ -126,7 +126,7 @@ fn dead_time_words(study: &DelayStudy, period: f64) -> String {
                 )
             };
             format!(
-                "from {}, {order} (sum of time constants {sum}); the interval covers both orders",
+                "from {}, {order} (sum of time constants {sum}); the interval allows for first and second order",
                 study.method.words()
             )
         }

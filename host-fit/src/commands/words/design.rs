@@ -45,7 +45,7 @@ fn track_words(design: &TrackDesign, period_s: f64) -> String {
     let law = &design.law;
     let ms = |samples: u32| milliseconds(samples.into(), period_s);
     let mut text = format!(
-        "holds {} of the interval ({:.3}, {:.3}); duty {:.3} on the model, u_eq = {:.3}\n\
+        "holds {} inside the interval ({:.3}, {:.3}); duty {:.3} on the model, u_eq = {:.3}\n\
          shortest times {} ms open, {} ms closed; predicts up to {} ms ahead{}",
         design.target,
         design.reachable[0],
@@ -70,8 +70,8 @@ fn track_words(design: &TrackDesign, period_s: f64) -> String {
 fn certificate_words(certificate: &Certificate) -> String {
     match certificate {
         Certificate::Bound(bound) => format!(
-            "certificate: on the model the flow ends within −{:.3} … +{:.3} of the target from any start; with a prediction \
-             error of {:.3} within −{:.3} … +{:.3}",
+            "certificate: from any initial state, y of the model ends between {:.3} below and {:.3} above the target; with \
+             a prediction error of {:.3}, between {:.3} below and {:.3} above",
             bound.below, bound.above, bound.error, bound.below_with_error, bound.above_with_error
         ),
         Certificate::None { reason } => {
@@ -145,10 +145,10 @@ fn optimum_words(optimum: &Optimum, period_s: f64) -> String {
             100.0 * planned.duty,
             planned.steady_value,
             match planned.cycle_s {
-                None => "with a receding horizon the valve stops switching or the model diverges".to_owned(),
+                None => "a receding-horizon law stops switching, or the model diverges under it".to_owned(),
                 Some(cycle_s) => format!(
                     "a receding-horizon law ends in a limit cycle of {:.0} ms ({:.0} % of it irregular), \
-                    which was evaluated like the other pulse trains",
+                    and this cycle was evaluated like the other pulse trains",
                     1000.0 * cycle_s,
                     100.0 * planned.irregular
                 ),
@@ -169,7 +169,7 @@ fn optimum_words(optimum: &Optimum, period_s: f64) -> String {
 /// The objective, and the reason if steady blowing is better than pulses.
 fn weighed_words(weighed: &Weighed, is_steady: bool) -> String {
     let mut text = format!(
-        "objective: mean y − {} × share of time open; the value is the lowest over periods up to 2 % off",
+        "objective: mean y − {} × share of time open; the value is the lowest over periods that differ by up to 2 %",
         weighed.air_price
     );
     let (Some(pulses), Some(steady)) = (weighed.pulses, weighed.steady_value) else {
@@ -209,7 +209,7 @@ impl Words for Margin {
             )
         });
         format!(
-            "robustness margin, one error at a time: {}. Inside it attachment is kept and the rms error stays below twice {:.3}",
+            "robustness margin, one error at a time: {}. Inside this margin attachment is kept, and the rms error stays below twice the {:.3} on the model",
             each.collect::<Vec<_>>().join(", "),
             self.rms
         )

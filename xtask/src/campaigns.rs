@@ -31,8 +31,8 @@ pub(crate) const LITERATURE: Task = Task {
 
 pub(crate) const LAWS: Task = Task {
     name: "laws",
-    does: "tests laws on rigs whose plants share no code with the model: wrong refusals, laws that lose \
-         attachment, margins; --help for its options",
+    does: "tests laws on rigs whose plants share no code with the model; counts wrong refusals, laws that lose \
+         attachment, and wrong margins; --help lists the options",
     run: |arguments| campaign("laws", arguments),
 };
 

@@ -297,7 +297,7 @@ pub enum DataProblem {
     NotSeconds(f64),
     /// A file of another program instead of a data set.
     #[error(
-        "is a {kind}, not a data set; make one of it with `host-fit import {name} -o DIR` and give the folder DIR here"
+        "is a {kind}, not a data set; make a data set of it with `host-fit import {name} -o DIR` and give the folder DIR here"
     )]
     ToImport {
         /// Kind of the file.

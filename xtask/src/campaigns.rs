@@ -6,7 +6,7 @@ use anyhow::Context;
 
 pub(crate) const EFFECTS: Task = Task {
     name: "hidden-effects",
-    does: "runs the diagnosis on simulated rigs of all families with hidden effects; --help for its options",
+    does: "runs the diagnosis on simulated rigs of all families with hidden effects; --help lists the options",
     run: |arguments| campaign("hidden-effects", arguments),
 };
 
@@ -19,13 +19,13 @@ pub(crate) const CALIBRATE: Task = Task {
 
 pub(crate) const TERMS: Task = Task {
     name: "hidden-terms",
-    does: "runs the search for unknown terms on rigs with physics that the catalogue lacks; --help for its options",
+    does: "runs the search for unknown terms on rigs with physics that the catalogue lacks; --help lists the options",
     run: |arguments| campaign("hidden-terms", arguments),
 };
 
 pub(crate) const LITERATURE: Task = Task {
     name: "literature",
-    does: "runs the diagnosis on published flows with realistic instruments; --help for its options",
+    does: "runs the diagnosis on published flows with realistic instruments; --help lists the options",
     run: |arguments| campaign("literature", arguments),
 };
 

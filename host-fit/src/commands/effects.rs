@@ -29,8 +29,8 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
     let Some(name) = &args.name else {
         console.say(&effect_table(&effects))?;
         console.say(
-            "\nTerms of base models: `identify` adds one if it lowers the validation error enough, \
-             `diagnose` never reports them as missing.",
+            "\nTerms of base models: `identify` adds a term if it lowers the validation error enough. `diagnose` \
+             never reports these terms as missing.",
         )?;
         console.say(&effect_table(&base_terms()))?;
         console.say(FLOW_TERMS)?;

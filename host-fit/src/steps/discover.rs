@@ -310,7 +310,7 @@ fn where_it_enters(trace: &Trace) -> String {
     let odds = odds.collect::<Vec<_>>().join(", ");
     match trace.place {
         Some(place) => format!(
-            "The error enters at the {}, for every quantity that it may depend on (posterior: {odds}).",
+            "The error enters at the {} (posterior: {odds}). The quantity on which it depends was not assumed.",
             place.word()
         ),
         None => format!(

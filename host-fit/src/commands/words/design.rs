@@ -45,7 +45,7 @@ fn track_words(design: &TrackDesign, period_s: f64) -> String {
     let law = &design.law;
     let ms = |samples: u32| milliseconds(samples.into(), period_s);
     let mut text = format!(
-        "holds {} inside the interval ({:.3}, {:.3}); duty {:.3} on the model, u_eq = {:.3}\n\
+        "holds {} inside the interval ({:.3}, {:.3}); duty {:.3} on the model ({:.3} by the formula for u_eq)\n\
          shortest times {} ms open, {} ms closed; predicts up to {} ms ahead{}",
         design.target,
         design.reachable[0],
@@ -116,7 +116,7 @@ fn optimum_words(optimum: &Optimum, period_s: f64) -> String {
     text.push('\n');
     text.push_str(&weighed_words(&optimum.weighed, law.period == 1));
     text.push_str(&format!(
-        "\nafter {}: mean y {:.3}; with a period that is 2 % off: mean y {:.3}; pole moduli {:.5} with the valve \
+        "\nafter {}: mean y {:.3}; with a period that differs by 2 %: mean y {:.3}; pole moduli {:.5} with the valve \
             closed, {:.5} with it open",
         duration(RULES.long_until, period_s),
         optimum.mean_after_minutes,
@@ -131,13 +131,13 @@ fn optimum_words(optimum: &Optimum, period_s: f64) -> String {
     }
     if let Some(mean) = optimum.refused_mean {
         text.push_str(&format!(
-            "\nrejected: {} pulse trains with a higher mean (up to {mean:.3}) that diverge in a long run: instabilities of the model",
+            "\nrejected: {} pulse trains with a higher mean (up to {mean:.3}), because the model diverges under them in a long run; they excite instabilities of the model",
             optimum.refused
         ));
     }
     if let Some(planned) = &optimum.planned {
         text.push_str(&format!(
-            "\nfree commands over {} s from rest ({}, every {:.0} ms): value {:.3} with {:.1} % of the air (steady blowing {:.3}); {}",
+            "\nbest command without a period over {} s from rest ({}, a decision every {:.0} ms): value {:.3} with {:.1} % of the air (steady blowing: value {:.3}); {}",
             planned.horizon_s,
             if planned.exact { "all tried" } else { "beam search" },
             1000.0 * planned.block_s,

@@ -241,7 +241,7 @@ pub enum DataProblem {
     },
     /// Samples are missing.
     #[error(
-        "time jumps by {step} s where the sampling period is {period} s: about {missing} sample(s) missing; \
+        "time jumps by {step} s where the sampling period is {period} s: about {missing} sample(s) are missing; \
              split the record there, or `host-fit import` it with --fill-gaps SECONDS (if only the times are \
              wrong: with --period SECONDS --ignore-time)"
     )]
@@ -396,7 +396,7 @@ pub enum DataProblem {
     NoRecords,
     /// `dataset.toml` does not parse, lacks a key or has one that does not exist.
     #[error(
-        "{0}; a dataset.toml has title and input (optional), sample_period_s, and per [[record]] name, file, use (\"identify\" or \"validate\") and, optional, u_before and lead_samples"
+        "{0}; a dataset.toml contains sample_period_s and, optionally, title and input; each [[record]] contains name, file, use (\"identify\" or \"validate\") and, optionally, u_before and lead_samples"
     )]
     Manifest(String),
     /// A record's file outside the data set's folder.

@@ -12,8 +12,8 @@ pub(crate) const EFFECTS: Task = Task {
 
 pub(crate) const CALIBRATE: Task = Task {
     name: "calibrate",
-    does: "counts error rates, coverage and power of the diagnosis for docs/calibration.md; a thousand rigs \
-         take ten hours, `--first 200` two; results are kept; takes the options of hidden-effects",
+    does: "counts error rates, coverage and power of the diagnosis for docs/calibration.md; a thousand rigs take ten \
+         hours, and `--first 200` takes two hours; a stopped run continues; the options are those of hidden-effects",
     run: calibrate,
 };
 

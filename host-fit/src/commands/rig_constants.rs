@@ -30,7 +30,7 @@ pub(crate) fn rust(rig: &RigFile) -> String {
         rig.valve.shortest_off_s as f32,
     );
     text.push_str(
-        "/// The measured channel: counts of 0, units per count, rails in counts; `None` if it was not measured.\n",
+        "/// The measured channel: counts at 0, units per count, lower and upper rail in counts; `None` if no channel was measured.\n",
     );
     text.push_str(&match &rig.channel {
         None => "pub const CHANNEL: Option<[f32; 4]> = None;\n".to_owned(),

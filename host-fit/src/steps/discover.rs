@@ -310,7 +310,7 @@ fn where_it_enters(trace: &Trace) -> String {
     let odds = odds.collect::<Vec<_>>().join(", ");
     match trace.place {
         Some(place) => format!(
-            "The error enters at the {} (posterior: {odds}). The quantity on which it depends was not assumed.",
+            "The error enters at the {} (posterior: {odds}). This result assumes nothing about the quantity on which the error depends.",
             place.word()
         ),
         None => format!(

@@ -152,7 +152,7 @@ fn new_effect(arguments: &[String]) -> Result<()> {
     for file in &written {
         println!("{file}");
     }
-    println!("Both have no influence yet; docs/adding-an-effect.md says what to add.");
+    println!("Both files have no influence yet; docs/adding-an-effect.md says what to add.");
     Ok(())
 }
 

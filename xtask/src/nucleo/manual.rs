@@ -286,7 +286,7 @@ fn watchdog(chip: &Chip) -> Result<String> {
         "the watchdog restarts the board after {least} to {most} s"
     );
     Ok(format!(
-        "restart after {:.0} to {:.0} ms, over the tolerance of the watchdog's clock",
+        "restart after {:.0} to {:.0} ms, within the tolerance of the watchdog's clock",
         1e3 * least,
         1e3 * most
     ))

@@ -176,7 +176,7 @@ fn weighed_words(weighed: &Weighed, is_steady: bool) -> String {
         return text;
     };
     text.push_str(&format!(
-        "\nsteady blowing {steady:.3}; the best pulses {:.3} (mean y {:.3} with {:.1} % of the air)",
+        "\nvalue of steady blowing {steady:.3}; value of the best pulses {:.3} (mean y {:.3} with {:.1} % of the air)",
         pulses.value,
         pulses.mean,
         100.0 * pulses.duty

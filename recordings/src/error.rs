@@ -241,7 +241,7 @@ pub enum DataProblem {
     },
     /// Samples are missing.
     #[error(
-        "time jumps by {step} s where the sampling period is {period} s: about {missing} sample(s) are missing; \
+        "time jumps by {step} s where the sampling period is {period} s: about {missing} sample(s) missing; \
              split the record there, or `host-fit import` it with --fill-gaps SECONDS (if only the times are \
              wrong: with --period SECONDS --ignore-time)"
     )]

@@ -137,7 +137,7 @@ fn optimum_words(optimum: &Optimum, period_s: f64) -> String {
     }
     if let Some(planned) = &optimum.planned {
         text.push_str(&format!(
-            "\nbest command without a period over {} s from rest ({}, a decision every {:.0} ms): value {:.3} with {:.1} % of the air (steady blowing: value {:.3}); {}",
+            "\nbest non-periodic command over {} s from rest ({}, a decision every {:.0} ms): value {:.3} with {:.1} % of the air (steady blowing: value {:.3}); {}",
             planned.horizon_s,
             if planned.exact { "all tried" } else { "beam search" },
             1000.0 * planned.block_s,

@@ -117,7 +117,7 @@ fn nearest_plant(model: &Model) -> anyhow::Result<(PlantSpec, Vec<String>)> {
     if !nuisances.is_empty() {
         let names: Vec<&str> = nuisances.iter().map(|added| added.name.as_str()).collect();
         left_out.push(format!(
-            "stress trials use plants without {}: their flow is of first order",
+            "stress trials use plants without {}, because the flow of these plants is of first order",
             names.join(", ")
         ));
     }

@@ -35,7 +35,7 @@ rules! {
     /// Penalty of each of these terms, in parameters.
     term_cost: f64 = 2.0, "parameters", "a lag and its weight";
     /// Factor on the first-order detectable amplitude, because a search that moves all lags imitates more.
-    margin: f64 = 2.0, "times the amplitude", "`cargo xtask calibrate`: without the factor 13 of 37 effects of the stated size were named, with it 9 of 15";
+    margin: f64 = 2.0, "times the amplitude", "`cargo xtask calibrate`: without this factor 13 of 37 effects of the stated size were named, with the factor 9 of 15";
     /// Iterations for an effect that is not linear in its amplitude.
     probes: usize = 4, "", "judgement";
 }

@@ -131,7 +131,7 @@ pub enum AverageError {
     },
     /// No complete period.
     #[error(
-        "{place}: no complete period to average ({found}); check --period against the recording and start it with --start at the beginning of a repeat"
+        "{place}: there is no complete period to average ({found}); compare --period with the recording, and give with --start the time at which a repeat begins"
     )]
     NothingLeft {
         /// The recording.
@@ -141,7 +141,7 @@ pub enum AverageError {
     },
     /// The command repeats with another period than stated.
     #[error(
-        "{place}: the command repeats every {found} s, not every {stated} s, so most periods of {stated} s would be dropped for their command; give --period {found}"
+        "{place}: the command repeats every {found} s, not every {stated} s, so most periods of {stated} s would be dropped, because their commands differ; give --period {found}"
     )]
     RepeatsEvery {
         /// The recording.

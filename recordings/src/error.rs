@@ -267,7 +267,7 @@ pub enum DataProblem {
     },
     /// The sampling periods from the times and as stated differ.
     #[error(
-        "the times of the rows are {found} s apart, but {by} {stated} s; correct the wrong one"
+        "the times of the rows are {found} s apart, but {by} {stated} s; correct the value that is wrong"
     )]
     PeriodMismatch {
         /// Sampling period from the time column, s.
@@ -297,7 +297,7 @@ pub enum DataProblem {
     NotSeconds(f64),
     /// A file of another program instead of a data set.
     #[error(
-        "is a {kind}, not a data set; make one of it with `host-fit import {name} -o DIR` and give the folder DIR here"
+        "is a {kind}, not a data set; make a data set of it with `host-fit import {name} -o DIR` and give the folder DIR here"
     )]
     ToImport {
         /// Kind of the file.
@@ -307,7 +307,7 @@ pub enum DataProblem {
     },
     /// An invalid sampling period.
     #[error(
-        "the sampling period is {0:?}; it must be a number of seconds above 0, from 1e-9 to 1e9; look for the unit of the times"
+        "the sampling period is {0:?}; it must be a number of seconds above 0, from 1e-9 to 1e9; check the unit of the times"
     )]
     BadPeriod(f64),
     /// Times so large that double precision does not resolve the samples.
@@ -396,7 +396,7 @@ pub enum DataProblem {
     NoRecords,
     /// `dataset.toml` does not parse, lacks a key or has one that does not exist.
     #[error(
-        "{0}; a dataset.toml has title and input (optional), sample_period_s, and per [[record]] name, file, use (\"identify\" or \"validate\") and, optional, u_before and lead_samples"
+        "{0}; a dataset.toml contains sample_period_s and, optionally, title and input; each [[record]] contains name, file, use (\"identify\" or \"validate\") and, optionally, u_before and lead_samples"
     )]
     Manifest(String),
     /// A record's file outside the data set's folder.

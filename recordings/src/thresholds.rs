@@ -7,11 +7,11 @@ crate::rules! {
     /// A time step may differ from the period by this, in addition to the rounding of the printed times.
     uneven: f64 = 0.1, "share of the period", "judgement";
     /// Largest difference of a time step from the period, rounding included.
-    most_uneven: f64 = 0.6, "share of the period", "a missing sample makes a difference of 1";
+    most_uneven: f64 = 0.6, "share of the period", "a missing sample makes a difference of one period";
     /// The mean step may differ from a stated period by this.
-    clock: f64 = 1e-3, "share of the period", "judgement: clock differences of a rig are smaller";
+    clock: f64 = 1e-3, "share of the period", "judgement: the clocks of a rig differ by less";
     /// `import --fill-gaps` inserts lost rows up to this share of the rows in the file.
-    lost: f64 = 0.1, "share of the rows", "judgement: more gaps are the rounding of a coarse clock";
+    lost: f64 = 0.1, "share of the rows", "judgement: more apparent gaps are caused by the rounding of a coarse clock";
     /// Times printed in this or a coarser unit count as rounded if rounding explains every step.
     coarse_s: f64 = 1.0, "s", "judgement: loggers with stamps of whole seconds";
     /// Times printed in a finer unit count as rounded only if at least this many steps differ from the most
@@ -32,8 +32,8 @@ crate::rules! {
     /// A command repeats with a period if this share of its edges has an equal edge at that distance.
     repeats: f64 = 0.9, "share of the edges", "judgement: allows some faulty repeats";
     /// A wrong stated period is reported if it would drop this share of the periods for their command.
-    other_commands: f64 = 0.25, "share of the periods", "judgement: at half the true length, half of the \
-         periods are dropped";
+    other_commands: f64 = 0.25, "share of the periods", "judgement: a stated period of half the true length drops \
+         half of the periods";
     /// Command sequences averaged in parallel until the most frequent one is known.
     sequences: usize = 4, "", "judgement";
 }

@@ -154,7 +154,7 @@ pub fn calibrate(
     let (low, high) = seen(&[&shut[..], &blown].concat());
     if low <= RAIL || high >= FULL_SCALE - RAIL {
         return Err(LineError::Calibration(format!(
-            "readings from {low} to {high} reach an end of the converter's range; change the divider (WIRING.md)"
+            "readings from {low} to {high} reach an end of the converter's range; change the voltage divider (WIRING.md)"
         )));
     }
     let equal = longest_equal(&shut).max(longest_equal(&blown));

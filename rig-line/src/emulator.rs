@@ -113,7 +113,7 @@ impl Emulator {
         };
         if !elf.is_file() {
             return Err(failed(std::io::Error::other(
-                "there is no such program; `cargo xtask firmware --board qemu-rig` builds it, `cargo xtask \
+                "there is no such program; `cargo xtask firmware --board qemu-rig` builds it, and `cargo xtask \
                  setup` installs the requirements",
             )));
         }

@@ -204,7 +204,7 @@ fn fits(command: &Command, board: &Info) -> Result<(), LineError> {
     }
     if board.period_us < 400 {
         return Err(refused(format!(
-            "the board samples every {period} s, but the line can transmit every sample only at periods of at \
+            "the board samples every {period} s, but the serial line can transmit every sample only at periods of at \
                  least 0.0004 s"
         )));
     }

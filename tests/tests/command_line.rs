@@ -566,7 +566,7 @@ fn a_law_that_loses_its_own_model_is_refused_with_the_targets_that_pass() {
     assert!(!lost.is_empty() && named.lost().len() == lost.len());
     json("codegen {} -o {}", &[&controlled, &constants]);
     let text = std::fs::read_to_string(&constants).expect("constants");
-    assert!(text.contains("LOSES ATTACHMENT with the model itself"));
+    assert!(text.contains("LOSES ATTACHMENT in these trials: the model itself"));
 }
 
 /// Records in volts with an offset: target, interval and trials are in volts, the law equals that for the same

@@ -107,7 +107,7 @@ fn what_is_no_loops_period_is_refused_before_anything_else() {
         assert_eq!(code, Some(1), "{error}");
         for part in [
             option,
-            "shorter than a sample",
+            "shorter than the model's sample period",
             "0.1 s",
             "`sample_period_s`",
         ] {

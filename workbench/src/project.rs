@@ -347,7 +347,10 @@ fn check(tree: &Tree) -> Result<(), String> {
             return Err(format!("model {} twice", node.id));
         }
         if node.parent.is_some_and(|p| earlier().all(|n| n.id != p)) {
-            return Err(format!("model {} comes before its parent", node.id));
+            return Err(format!(
+                "model {} is listed before the model from which it was made",
+                node.id
+            ));
         }
         let mut parts = Path::new(&node.file).components();
         let plain = matches!(parts.next(), Some(std::path::Component::Normal(_)));

@@ -158,7 +158,7 @@ async fn aside<T: Send + 'static>(
         // A panic in the library is a fault of the tool, but the server continues.
         Err(_) => Err(refused(
             StatusCode::INTERNAL_SERVER_ERROR,
-            "this failed inside the program; please report it with the log of the project",
+            "the request failed because of a fault in the program; please report the fault with the log of the project",
         )),
     }
 }
@@ -274,7 +274,7 @@ async fn run<B: Bench>(State(shared): At<B>, body: Bytes) -> Result<Response, Re
             Ok(Ok(())) => None,
             Ok(Err(why)) => Some(why.0),
             Err(_) => Some(
-                "this failed inside the program; please report it with the log of the project"
+                "the step failed because of a fault in the program; please report the fault with the log of the project"
                     .to_owned(),
             ),
         };

@@ -15,9 +15,9 @@ pub(crate) const TASK: Task = Task {
 const USAGE: &str = "usage: cargo xtask bench-search [--sets 1,2,…] [--seeds N] [--evaluations N] [--seconds N] [--ours]
   --sets         seeds of the paper-like sets to search (default 1)
   --seeds        runs of each method, with the seeds 0 … N−1 (default 3)
-  --evaluations  most evaluations of a peer (default 50000)
-  --seconds      most processor time of a peer's run, in seconds (default 60)
-  --ours         without the peers";
+  --evaluations  largest number of evaluations of another optimiser (default 50000)
+  --seconds      largest processor time of a run of another optimiser, in seconds (default 60)
+  --ours         without the other optimisers";
 
 /// One optimisation.
 struct Run {

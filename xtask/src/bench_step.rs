@@ -113,7 +113,7 @@ fn bench_step(_arguments: &[String]) -> Result<()> {
         ("C exported", exported, exported_most),
     ] {
         println!(
-            "{what:<10} {:>7.1} instructions per step, at most {:.0}; model-core needs {:.3} times as many",
+            "{what:<10} {:>7.1} instructions per step (allowed: {:.0}); model-core needs {:.3} times as many",
             instructions(ticks),
             most * 1.25,
             own / ticks

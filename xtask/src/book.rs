@@ -201,8 +201,8 @@ fn catalogue(effects: &[Effect]) -> String {
         );
     }
     text.push_str(
-        "\nTerms that `identify` adds by itself and that are never reported as missing: [base terms](base-terms.md). An effect that is not\n\
-         here: [write your own](user-effects.md), or let [`discover`](discover.md) find it. To add an effect to the catalogue: [adding an effect](adding-an-effect.md).\n",
+        "\nTerms that `identify` adds by itself and that are never reported as missing: [base terms](base-terms.md). For an effect that\n\
+         is not in the catalogue, [write your own](user-effects.md) or let [`discover`](discover.md) find it. To add an effect to the catalogue: [adding an effect](adding-an-effect.md).\n",
     );
     text
 }
@@ -236,7 +236,7 @@ fn page(effect: &Effect, simulated: Option<&str>) -> String {
             text,
             "\n## Residual\n\n![Response with and without {0}, and their difference]({0}.svg)\n\nSimulated{with}. Above: y \
              with the effect, and y of the same model without it. Below: the difference, which is\nthe residual of the model \
-             without the effect. A refit of the other parameters makes it smaller.\n",
+             without the effect. A refit of the other parameters makes this residual smaller.\n",
             effect.name
         );
     }

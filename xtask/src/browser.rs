@@ -6,7 +6,7 @@ use anyhow::{Result, bail};
 
 pub(crate) const TASK: Task = Task {
     name: "browser",
-    does: "tests report and workbench in chromium; leaves pictures in target/browser; --bless stores them as inspected",
+    does: "tests report and workbench in chromium; leaves pictures in target/browser; --bless stores these pictures as the reference",
     run: browser,
 };
 

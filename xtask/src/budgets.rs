@@ -81,7 +81,9 @@ fn exceeded(budgets: &Budgets, outcome: &Outcome, board: Size) -> Vec<String> {
         .iter()
         .filter_map(|(case, limit)| {
             let found = outcome.most.get(case).copied().unwrap_or(f64::INFINITY);
-            (found > *limit).then(|| format!("{case}'s worst sample {found:.0} of {limit:.0}"))
+            (found > *limit).then(|| {
+                format!("{case}: {found:.0} instructions in the worst sample, allowed {limit:.0}")
+            })
         });
     rows.chain(worst).collect()
 }
@@ -126,7 +128,7 @@ mod tests {
                 "board_flash_bytes 112 of 100",
                 "effect_new 23 of 20",
                 "law has no budget",
-                "law's worst sample 41 of 40"
+                "law: 41 instructions in the worst sample, allowed 40"
             ]
         );
     }

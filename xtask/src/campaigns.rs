@@ -6,33 +6,33 @@ use anyhow::Context;
 
 pub(crate) const EFFECTS: Task = Task {
     name: "hidden-effects",
-    does: "runs the diagnosis on simulated rigs of all families with hidden effects; --help for its options",
+    does: "runs the diagnosis on simulated rigs of all families with hidden effects; --help lists the options",
     run: |arguments| campaign("hidden-effects", arguments),
 };
 
 pub(crate) const CALIBRATE: Task = Task {
     name: "calibrate",
-    does: "counts error rates, coverage and power of the diagnosis for docs/calibration.md; a thousand rigs \
-         take ten hours, `--first 200` two; results are kept; takes the options of hidden-effects",
+    does: "counts error rates, coverage and power of the diagnosis for docs/calibration.md; a thousand rigs take ten \
+         hours, and `--first 200` takes two hours; a stopped run continues; the options are those of hidden-effects",
     run: calibrate,
 };
 
 pub(crate) const TERMS: Task = Task {
     name: "hidden-terms",
-    does: "runs the search for unknown terms on rigs with physics that the catalogue lacks; --help for its options",
+    does: "runs the search for unknown terms on rigs with physics that the catalogue lacks; --help lists the options",
     run: |arguments| campaign("hidden-terms", arguments),
 };
 
 pub(crate) const LITERATURE: Task = Task {
     name: "literature",
-    does: "runs the diagnosis on published flows with realistic instruments; --help for its options",
+    does: "runs the diagnosis on published flows with realistic instruments; --help lists the options",
     run: |arguments| campaign("literature", arguments),
 };
 
 pub(crate) const LAWS: Task = Task {
     name: "laws",
-    does: "tests laws on rigs whose plants share no code with the model: wrong refusals, laws that lose \
-         attachment, margins; --help for its options",
+    does: "tests laws on rigs whose plants share no code with the model; counts wrong refusals, laws that lose \
+         attachment, and wrong margins; --help lists the options",
     run: |arguments| campaign("laws", arguments),
 };
 

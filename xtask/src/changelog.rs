@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 
 pub(crate) const TASK: Task = Task {
     name: "changelog",
-    does: "prints the changes since the last release; VERSION DATE: moves them into CHANGELOG.md",
+    does: "prints the changes since the last release; with VERSION DATE, moves these changes into CHANGELOG.md",
     run: |arguments| changelog(&root(), arguments),
 };
 
@@ -32,7 +32,7 @@ fn changelog(root: &Path, arguments: &[String]) -> Result<()> {
     let [version, date] = arguments else {
         ensure!(
             arguments.is_empty(),
-            "changelog accepts nothing, or VERSION DATE"
+            "changelog accepts either no arguments, or VERSION DATE"
         );
         print!("{section}");
         return Ok(());
@@ -45,7 +45,7 @@ fn changelog(root: &Path, arguments: &[String]) -> Result<()> {
     let text = fs::read_to_string(&path).context("CHANGELOG.md")?;
     ensure!(
         !text.contains(&format!("{NEWEST}{version}]")),
-        "CHANGELOG.md has a release {version}"
+        "CHANGELOG.md already has a release {version}"
     );
     let at = text.find(NEWEST).unwrap_or(text.len());
     let (head, rest) = text.split_at(at);
@@ -81,7 +81,7 @@ fn fragments(folder: &Path) -> Result<Vec<(PathBuf, usize, String)>> {
         });
         let Some(kind) = kind else {
             bail!(
-                "changelog/{name}: the name is one of {} and a word, as in `fixed-delay.md`",
+                "changelog/{name}: the name must be one of {}, followed by a word, as in `fixed-delay.md`",
                 kinds()
             );
         };

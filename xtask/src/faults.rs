@@ -13,8 +13,8 @@ use std::time::{Duration, Instant};
 
 pub(crate) const TASK: Task = Task {
     name: "faults",
-    does: "injects faults under QEMU, also on the line: each must close the valve, be latched and be logged; \
-         --model FILE",
+    does: "injects faults under QEMU, also on the serial line; each fault must close the valve, be latched and be \
+         logged; --model FILE",
     run: faults,
 };
 

@@ -7,8 +7,8 @@ use crate::shell::{run, scenario};
 
 pub(crate) const TASK: Task = Task {
     name: "fuzz",
-    does: "gives mutated files, frames and texts to every reader; --minutes N: time for all readers together; \
-         NAMES: only these readers",
+    does: "gives mutated files, frames and texts to every reader; --minutes N: total time of all readers; NAMES: \
+         only the named readers",
     run: |arguments| run(scenario("fuzz").args(arguments)),
 };
 

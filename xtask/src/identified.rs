@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 pub(crate) const TASK: Task = Task {
     name: "identified",
-    does: "generates firmware/identified from its model files; --check compares instead",
+    does: "generates firmware/identified from its model files; --check only compares",
     run: identified,
 };
 

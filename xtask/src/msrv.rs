@@ -7,7 +7,7 @@ use crate::shell::{command, firmware_target, root, run, target};
 
 pub(crate) const TASK: Task = Task {
     name: "msrv",
-    does: "checks the crates for boards with the compiler of their `rust-version`, where rustup can get it",
+    does: "checks the crates for boards with the compiler of their `rust-version`, if rustup can install it",
     run: |_| msrv(),
 };
 

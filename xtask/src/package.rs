@@ -177,7 +177,7 @@ fn outside(packed: &BTreeSet<PathBuf>) -> Result<Vec<String>> {
     let missing = missing.iter().map(|file| {
         let file = file.strip_prefix(&root).unwrap_or(file);
         format!(
-            "{}: compiled into the program, but in no package",
+            "{}: it is compiled into the program, but no package contains it",
             file.display()
         )
     });

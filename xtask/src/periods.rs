@@ -7,7 +7,7 @@ use anyhow::{Context, Result, bail};
 
 pub(crate) const TASK: Task = Task {
     name: "periods",
-    does: "compares firmware and plant in lockstep with the host at loop periods of 0.2, 10 and 100 ms, bit for bit; the emulated board and its faults at 10 ms",
+    does: "compares firmware and plant in lockstep with the host at loop periods of 0.2, 10 and 100 ms, bit for bit; tests the emulated board and its faults at 10 ms",
     run: periods,
 };
 

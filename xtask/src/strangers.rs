@@ -15,9 +15,9 @@ const HEAD: &str = "\
 # Records from other loggers
 
 Written by `cargo xtask strangers --page`. The sets are described in
-[tests/data/strangers](../tests/data/strangers/README.md). FIT in percent, on the validation records; \"(own)\" on the
-estimation records, if there is no validation record. FOPDT and SOPDT: first and second order with dead time, fitted in
-free run. ARX: ARX(2,2). *edges* is the mean delay that `delay` measures, in samples.
+[tests/data/strangers](../tests/data/strangers/README.md). FIT is in percent, on the validation records. \"(own)\" marks
+a FIT on the estimation records of a set without a validation record. FOPDT and SOPDT are models of first and second
+order with dead time, fitted in free run; ARX is ARX(2,2). *edges* is the mean delay that `delay` measures, in samples.
 
 ";
 /// The drawn sets of the page.
@@ -34,7 +34,7 @@ right if all of these hold:
 - the FIT of the model is at most one point below that of the best baseline;
 - every printed error equals the error of the written file.
 
-Shares with 95 % bounds.
+The shares have 95 % bounds.
 
 ";
 

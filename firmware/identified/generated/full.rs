@@ -208,7 +208,7 @@ pub const LAW: Law = model_core::control::Tracking {
 const _: () = {
     assert!(
         checks::law(& LAW),
-        "a constant of the law is out of range, or its reference is out of reach"
+        "a constant of the law is out of range, or the law's reference is outside the reachable interval"
     );
     assert!(
         LOOK_AHEAD >= checks::look_ahead(& LAW, FIRST_ARRIVAL),

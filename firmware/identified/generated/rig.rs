@@ -12,5 +12,5 @@ pub const STUCK_AFTER_S: f32 = 0.5;
 pub const RESIDUAL_ENVELOPE: f32 = 0.5;
 /// The valve's shortest times open and shut, s.
 pub const SHORTEST_S: [f32; 2] = [0.004, 0.004];
-/// The measured channel: counts of 0, units per count, rails in counts; `None` if it was not measured.
+/// The measured channel: counts at 0, units per count, lower and upper rail in counts; `None` if no channel was measured.
 pub const CHANNEL: Option<[f32; 4]> = None;

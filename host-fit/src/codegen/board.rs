@@ -19,13 +19,13 @@ const OVERHEAD: usize = 2 * 1024;
 pub enum BoardError {
     /// The model has no law.
     #[error(
-        "key `law`: the model has no law, which a board needs. Run `host-fit design` on it and use the file that it writes."
+        "key `law`: the model has no law, but a board needs one. Run `host-fit design` on the model and use the file that `design` writes."
     )]
     NoLaw,
     /// The jet blows at the lower command, but a board opens the valve with its output on.
     #[error(
         "key `command`: the lower command ({full:?}) is a full jet and {off:?} is no jet, but a board blows when its \
-            output is on. Record u with 1 for a jet and 0 for none, and identify again."
+            output is on. Record u again with 1 for a full jet and 0 for no jet, and identify again."
     )]
     Inverted {
         /// The command of no jet.
@@ -53,7 +53,7 @@ pub enum BoardError {
     },
     /// The memory of the model is too long for the board.
     #[error(
-        "key `{key}`: the model stores {kept} samples for it. With the law the loop needs {bytes} bytes; the board has {most}. {remedy}"
+        "key `{key}`: the model stores {kept} samples for this key. Model and law together need {bytes} bytes of memory; the board has {most}. {remedy}"
     )]
     Memory {
         /// Key that needs most of the memory.
@@ -139,7 +139,7 @@ fn parts(model: &Model) -> Vec<Part> {
     } else {
         4 * memory.words()
     };
-    let shorter = "Identify it again with a shorter `--max-lag`.";
+    let shorter = "Identify the model again with a shorter `--max-lag`.";
     let mut parts = vec![
         (
             outputs.to_owned(),
@@ -151,7 +151,7 @@ fn parts(model: &Model) -> Vec<Part> {
             "delay".to_owned(),
             memory.jets,
             jets,
-            "Only a model with a shorter delay, or one at a longer sample period, fits.",
+            "Identify a model with a shorter delay, or a model with a longer sample period.",
         ),
     ];
     for added in &model.effects {
@@ -170,7 +170,7 @@ fn parts(model: &Model) -> Vec<Part> {
             format!("effect.{}", added.name),
             samples,
             8 * samples,
-            "Only a model without this effect, or with a shorter delay in it, fits.",
+            "Use a model without this effect, or with a shorter delay in this effect.",
         ));
     }
     parts
@@ -207,7 +207,7 @@ mod tests {
         refused(&|model| model.law = None, ["`law`", "host-fit design"]);
         refused(
             &|model| (model.command.off, model.command.full) = (1.0, 0.0),
-            ["`command`", "Record u with 1 for a jet"],
+            ["`command`", "Record u again with 1 for a full jet"],
         );
         refused(
             &|model| model.sample_period_s = 1.0,

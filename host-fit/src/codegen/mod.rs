@@ -69,8 +69,8 @@ pub enum CodegenError {
     },
     /// The model's response decays within too few samples for the self-test, or does not decay.
     #[error(
-        "the model's response to the reference command is not finite after {samples} samples: it is \
-         unstable. Identify it again, with fewer lags or `--objective free-run`."
+        "the model is unstable: its response to the reference command is not finite after {samples} samples. \
+         Identify the model again, with fewer lags or `--objective free-run`."
     )]
     Unstable {
         /// Samples after which the response is not finite.
@@ -256,7 +256,7 @@ fn header_lines(model: &Model) -> Vec<String> {
     let lost = model.law.as_ref().map_or(&[][..], Law::lost);
     if !lost.is_empty() {
         line(format!(
-            "- the law LOSES ATTACHMENT with {}",
+            "- the law LOSES ATTACHMENT in these trials: {}",
             lost.join(", ")
         ));
     }

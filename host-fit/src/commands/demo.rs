@@ -176,7 +176,7 @@ fn real_input(
         // A law is used only if it is better than a constant delay.
         let is_constant = matches!(found.model.delay, Delay::Fixed { .. });
         let name = match (kind, is_constant) {
-            (DelayKind::StateDependent, true) => "constant: no law is better",
+            (DelayKind::StateDependent, true) => "constant: no delay law has a lower error",
             _ => name,
         };
         let percent = |i: &Option<Indicators>| i.as_ref().map_or(f64::NAN, |i| i.fit_percent);

@@ -146,9 +146,9 @@ fn at_period(option: &str, time: TimeSpan, period_s: f64) -> anyhow::Result<f64>
         TimeSpan::Samples(samples) => Ok(f64::from(samples) * period_s),
         // A tolerance of 1/1000 for rounded printed values.
         TimeSpan::Seconds(seconds) if seconds > 0.0 && seconds < 0.999 * period_s => bail!(
-            "{option} {seconds} s is shorter than a sample of this model, {period_s} s (key `sample_period_s`), and the \
-             loop cannot switch within one: give {option} {period_s} or more, or {option} 0 if the valve follows every \
-             sample"
+            "{option} {seconds} s is shorter than the model's sample period, {period_s} s (key `sample_period_s`), \
+             and the loop switches at most once per sample. Give {option} {period_s} or more, or {option} 0 if the \
+             valve follows every sample"
         ),
         TimeSpan::Seconds(seconds) => Ok(seconds),
     }
@@ -183,8 +183,9 @@ impl ShortestTime<'_> {
                     format!("the rig's shortest effective pulse is {known} s (rig.toml)")
                 } else {
                     format!(
-                        "the shortest time between two switches in the records of the model is {known} s, and \
-                        the response to shorter ones is unknown; record shorter ones, or measure the valve (`record --calibrate`, then `--rig rig.toml`)"
+                        "the shortest time between two switches in the records of the model is {known} s, and the \
+                        response to shorter times is unknown; record shorter times, or measure the valve (`record \
+                        --calibrate`, then `--rig rig.toml`)"
                     )
                 };
                 bail!(

@@ -79,8 +79,8 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
     }
     console.show(&finding, &[], &written)?;
     if args.experiment.is_some() && separation.is_none() {
-        console.say("no experiment was written: no other model fits these records equally well, or no command \
-            distinguishes these models")?;
+        console.say("no experiment was written: either no other model fits these records equally well, or no command \
+            distinguishes the models that fit equally well")?;
     }
     Ok(())
 }

@@ -105,7 +105,7 @@ pub(crate) fn experiment_picture(separation: &Separation) -> Picture {
     let most = (0..experiment.u.len()).max_by(|a, b| apart(a).total_cmp(&apart(b)));
     let most_s = most.unwrap_or_default() as f64 * experiment.sample_period_s;
     closed_loop(&ClosedLoop {
-        title: "Prediction of each model, where they differ most",
+        title: "Prediction of each model, where the models differ most",
         y_label: "friction gain y",
         air_label: "",
         sample_period_s: experiment.sample_period_s,

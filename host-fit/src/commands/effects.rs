@@ -9,7 +9,7 @@ use super::effect_names::EffectName;
 use super::words::{Words, effect_table};
 
 /// Base terms that are lags of the recursion and have no card in the catalogue.
-const FLOW_TERMS: &str = "flow-lag         flow   a second lag in series: T2·q̇ = u − q replaces u in the \
+const FLOW_TERMS: &str = "flow-lag         flow   a second lag in series: T2·q̇ = u − q; q replaces u in the \
                           recursion\nflow-memory      flow   a later lag of y: a·y(t − T) is added to the \
                           recursion";
 
@@ -29,8 +29,8 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
     let Some(name) = &args.name else {
         console.say(&effect_table(&effects))?;
         console.say(
-            "\nTerms of base models: `identify` adds one if it lowers the validation error enough, \
-             `diagnose` never reports them as missing.",
+            "\nTerms of base models: `identify` adds a term if it lowers the validation error enough. `diagnose` \
+             never reports these terms as missing.",
         )?;
         console.say(&effect_table(&base_terms()))?;
         console.say(FLOW_TERMS)?;

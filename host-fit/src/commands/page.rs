@@ -406,9 +406,9 @@ fn report_trace(report: &mut Report, trace: &Trace) {
     };
     report.section("Trace of the unexplained error");
     report.paragraph(&format!(
-        "The signal at the {} that would explain the error of the base model. It assumes no coordinate. \
-         Compare it with other signals measured on the same day; `--trace trace.csv` writes it for every \
-         place.",
+        "The signal at the {} that would explain the error of the base model. The estimate does not assume on which \
+         quantity the signal depends. Compare the signal with others measured on the same day; `--trace trace.csv` \
+         writes the signals of all places.",
         entry.place().word()
     ));
     for record in trace.records.iter().rev().take(TRACED_RECORDS) {
@@ -562,7 +562,7 @@ pub(super) fn living(
 pub(crate) fn report_scores(report: &mut Report, scores: &Scores) {
     report.table(
         "Free run against the measurement. FIT, ρ and ε are eqs. (10), (11) and (9) of the paper. Noise is the \
-         standard error of the measurement. Inside is the share of samples within the measurement's envelope.",
+         standard error of the measurement. “Inside” is the share of samples that lie within the measurement's envelope, from y_min to y_max.",
         &[
             Column::Text("record"),
             Column::Text("use"),
@@ -647,8 +647,8 @@ fn candidates_caption(diagnosis: &Diagnosis) -> String {
         |seconds| format!("runs restarted every {} s", significant(seconds, 3)),
     );
     format!(
-        "Each effect alone is added to the same base model and refitted together with all other parameters. The grey line \
-         is the base model without the candidate. Both are {error}s of {runs}."
+        "Each effect alone is added to the same base model and refitted together with all other parameters. The grey \
+         line is the base model without the candidate. All values are {error}s of {runs}."
     )
 }
 

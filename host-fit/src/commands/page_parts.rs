@@ -142,7 +142,7 @@ pub(crate) fn stretch_figure(
         ..measured(record)
     });
     let caption = format!(
-        "The {} s of the {} with the largest error. There: {errors}.",
+        "The {} s of the {} with the largest error. Errors in this interval: {errors}.",
         significant(stretch.to - stretch.from, 2),
         ErrorKind::of(record.role).records()
     );
@@ -221,7 +221,7 @@ pub(crate) fn check_figures(records: &[Record], runs: &[Run<'_>]) -> Vec<Figure>
             log_x: false,
         }),
         format!(
-            "95 % of the lags of a white residual lie within the band; coloured measurement noise exceeds it as well. Outside: {}.",
+            "95 % of the lags of a white residual lie within the band. Coloured measurement noise exceeds the band as well. Share of the lags outside: {}.",
             outside(&|i| tested[i].0.outside)
         ),
     ));
@@ -239,7 +239,7 @@ pub(crate) fn check_figures(records: &[Record], runs: &[Run<'_>]) -> Vec<Figure>
             log_x: false,
         }),
         format!(
-            "Peaks outside the band at positive lags are dynamics from u to y that the model lacks. Outside: {}.",
+            "Peaks outside the band at positive lags show dynamics from u to y that the model lacks. Share of the lags outside: {}.",
             outside(&|i| tested[i].1.outside)
         ),
     ));
@@ -342,8 +342,8 @@ fn responses(runs: &[Run<'_>]) -> Option<Figure> {
             band: None,
             log_x: false,
         }),
-        "The command opens from rest (0 → 1), and closes from the steady state (1 → 0, sign reversed). For a \
-         linear plant the two responses are equal."
+        "The command switches on from rest (0 → 1), and off from the steady state (1 → 0; this response is drawn \
+         with the opposite sign). For a linear plant the two responses are equal."
             .to_owned(),
     ))
 }
@@ -412,10 +412,11 @@ fn over_records(
             measured: &measured,
         }),
         format!(
-            "Cross-spectrum of u and y over the spectrum of u, in twelve bands per decade, from the {kind}; y per full jet. The \
-             curves are the same estimate from the free runs. Only bands with significant coherence (5 % level). The limits contain \
-             measurement noise and the part of y that is not linear in u; they hold for each band alone. If a curve leaves them, the \
-             model lacks dynamics there."
+            "Cross-spectrum of u and y divided by the spectrum of u, in twelve bands per decade, from the {kind}; \
+             unit: y per full jet. The curves are the same estimate from the free runs. Only bands with significant \
+             coherence (5 % level) are drawn. The 95 % limits account for measurement noise and for the part of y \
+             that is not linear in u. They hold for each band separately. If a curve leaves the limits, the model \
+             lacks dynamics there."
         ),
     ))
 }
@@ -446,13 +447,13 @@ fn at_levels(runs: &[Run<'_>], levels: &[[Option<FrequencyResponse>; 2]]) -> Opt
     if curves.is_empty() {
         return None;
     }
-    let mut caption = "Each model with its effects and its dead time, linearised at rest (command off) and in the steady state with \
-                       the command on; y per full jet, for small changes of the duty. No band: a model file has no covariance of \
-                       its coefficients."
+    let mut caption = "Each model with its effects and its dead time, linearised at rest (command off) and in the \
+                       steady state with the command on. Unit: y per full jet, for small changes of the duty. No \
+                       confidence band is drawn, because a model file has no covariance of its coefficients."
         .to_owned();
     if levels.iter().flatten().any(Option::is_none) {
         caption.push_str(
-            " Not drawn: a level at which the model is not linear for small changes of the command or does not settle.",
+            " A level is not drawn if the model does not settle there, or is not linear for small changes of the command.",
         );
     }
     Some((

@@ -30,7 +30,7 @@ pub(crate) fn rust(rig: &RigFile) -> String {
         rig.valve.shortest_off_s as f32,
     );
     text.push_str(
-        "/// The measured channel: counts of 0, units per count, rails in counts; `None` if it was not measured.\n",
+        "/// The measured channel: counts at 0, units per count, lower and upper rail in counts; `None` if no channel was measured.\n",
     );
     text.push_str(&match &rig.channel {
         None => "pub const CHANNEL: Option<[f32; 4]> = None;\n".to_owned(),
@@ -79,7 +79,7 @@ pub(crate) fn fits(rig: &RigFile, model: &Model) -> Result<(), String> {
         return Err(format!(
             "`sensor` and the model's training range: y from {least:.3} to {most:.3} was recorded, but this \
             rig's converter covers {low:.3} to \
-             {high:.3}; the model belongs to another rig or divider: calibrate again, or identify on this \
+             {high:.3}; the model belongs to another rig or voltage divider: calibrate again, or identify on this \
              rig"
         ));
     }

@@ -109,7 +109,7 @@ impl Tried {
         let decide = self.proof.cases.iter().filter(|case| case.group.decides());
         let (decide, lost) = (decide.count(), self.proof.lost());
         let mut text = if lost.is_empty() && decide == 1 {
-            "attachment is kept in the only trial that decides (the model)".to_owned()
+            "attachment is kept in the trial on the model; no other trial decides".to_owned()
         } else if lost.is_empty() {
             format!(
                 "attachment is kept in all {decide} trials on plants that are consistent with the records"
@@ -124,7 +124,7 @@ impl Tried {
         let beyond = self.proof.lost_beyond_the_records();
         if !beyond.is_empty() {
             text.push_str(&format!(
-                "\nwarning: on plants that are not consistent with the records, attachment is lost with {}",
+                "\nwarning: on plants that are not consistent with the records, attachment is lost in these trials: {}",
                 few(&beyond)
             ));
         }

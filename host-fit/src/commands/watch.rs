@@ -114,7 +114,7 @@ fn judged(verdict: &Verdict) -> String {
             format!("the model is not checked yet: the baseline needs {blocks_left} more blocks")
         }
         Verdict::True { largest, threshold } => format!(
-            "the model still fits: evidence of a change 10^{largest:.1} at most (alarm at 10^{threshold:.1})"
+            "the model still fits: the evidence of a change was at most 10^{largest:.1} (alarm at 10^{threshold:.1})"
         ),
         Verdict::Stopped {
             at_s,
@@ -123,9 +123,9 @@ fn judged(verdict: &Verdict) -> String {
             distance,
             threshold,
         } => format!(
-            "MODEL NO LONGER FITS at {at_s:.1} s: the residual went from {usual:.4} to {residual:.4} in the last block, \
-             {:.1} standard deviations; the evidence of a change exceeds 10^{threshold:.1}; check the log with `compare` \
-             and `diagnose`",
+            "MODEL NO LONGER FITS at {at_s:.1} s: the mean residual changed from {usual:.4} to {residual:.4} in the \
+             last block, by {:.1} standard deviations; the evidence of a change exceeds 10^{threshold:.1}. Check the \
+             log with `compare` and `diagnose`",
             distance.abs()
         ),
     }
@@ -154,7 +154,7 @@ fn order(line: &str) -> Result<Order, String> {
     match (change, rest) {
         (Some(change), None) => Ok(Order::Change(change)),
         _ => Err(format!(
-            "`{}` is no change; say `target Y`, `air SHARE`, `pause`, `resume` or `stop`",
+            "`{}` is not a valid line; write `target Y`, `air SHARE`, `pause`, `resume` or `stop`",
             line.trim()
         )),
     }

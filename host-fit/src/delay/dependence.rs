@@ -226,8 +226,8 @@ pub(super) fn words(
                 Some(reason) if tests.law.is_some_and(|p| p < RULES.significant) =>
                     reason.to_owned(),
                 _ => format!(
-                    "the delay changes by {:.1} samples over the range of the averaged output (p {}), which is not \
-                        significant or less than one sample",
+                    "the delay changes by {:.1} samples over the range of the averaged output (p {}); this change is \
+                        not significant, or less than one sample",
                     tests.change.abs(),
                     p(tests.law)
                 ),

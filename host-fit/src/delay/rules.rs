@@ -23,7 +23,7 @@ rules! {
     noise_allowed: f64 = 1.5, "times the standard deviation", "judgement: the noise may be coloured";
     /// With a slow disturbance, one plant describes the records if the dead times of single edges scatter by no more
     /// than this factor times their standard errors.
-    scatter_allowed: f64 = 2.0, "times the standard error", "0.5 and 0.7 on two records of a drifting temperature; 3.2 and 3.5 on data/hidden-ramp and data/paper-like, whose delay depends on y";
+    scatter_allowed: f64 = 2.0, "times the standard error", "the factor is 0.5 and 0.7 on two records of a drifting temperature; it is 3.2 and 3.5 on data/hidden-ramp and data/paper-like, whose delay depends on y";
     /// An edge needs this many samples on either side to be located separately; with fewer, the time constants
     /// of all edges are used.
     fewest_reach: usize = 12, "samples", "judgement: twice the fewest samples on either side of an arrival";

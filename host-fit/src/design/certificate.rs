@@ -186,7 +186,7 @@ impl Positive {
         };
         if mixes && model.grading != Grading::Proportional {
             return Err(
-                "the delay is between two samples and the jet response is not proportional",
+                "the delay is not a whole number of samples, and the jet response is not proportional",
             );
         }
         let is_sensor = |added: &Added| {

@@ -28,12 +28,12 @@ rules! {
     /// Delay tables cover flows up to this level.
     swing: f64 = 1.2, "times the friction under steady blowing", "judgement";
     /// A pulse that is longer than the dispersion of its edges by at least this always arrives.
-    sure_pulse: u32 = 3, "samples", "theory 3.2: k − h advances by 0 to 2 a sample";
+    sure_pulse: u32 = 3, "samples", "theory 3.2: the index k − h of the arriving command advances by 0 to 2 per sample";
     /// Standard deviation of the model error assumed in the observer. Smaller: the estimate follows the
     /// model; larger: it follows the noise.
     model_error: f64 = 0.005, "share of the reachable interval", "tuned on plants other than those of docs/law.md";
     /// Sensor noise averaged over 64 samples, if the rig's was not measured.
-    usual_slow_noise: f64 = 0.025, "y", "a hot film: white 0.03, coloured 0.035 with 20 ms";
+    usual_slow_noise: f64 = 0.025, "y", "a hot film: white noise of 0.03 y, and coloured noise of 0.035 y with a correlation time of 20 ms";
     /// Largest observer correction per sample.
     observer_most: f64 = 0.1, "share of the residual", "judgement";
     /// Rate of the bias estimate: share of a residual per delay time. It is slow, so that neither noise nor a
@@ -55,8 +55,9 @@ rules! {
     /// Largest correction of bias and integral.
     correction: f64 = 0.3, "share of the reachable interval", "judgement";
     /// Anticipations that are tried in turn while the rms error on the model falls.
-    anticipations: [f64; 6] = [0.85, 0.7, 0.55, 0.4, 0.2, 0.0], "of half a shortest time", "a grid; a flow that settles within \
-         a shortest time m reaches its centre after τ·ln(2/(1 + e^(−m/τ)))";
+    anticipations: [f64; 6] = [0.85, 0.7, 0.55, 0.4, 0.2, 0.0], "of half a shortest time", "a grid; with the \
+         shortest time m, a flow with the time constant τ crosses the centre of its swing after τ·ln(2/(1 + \
+         e^(−m/τ)))";
     /// The rms error must fall by this share.
     anticipated: f64 = 0.005, "share of the rms error", "judgement";
     /// Switches that the budget can accumulate. With fewer than those of two pulses, a valve that was open for a
@@ -124,7 +125,7 @@ rules! {
     /// Rays in each plane of two errors, a multiple of four.
     margin_rays: u32 = 12, "", "judgement: limits the time";
     /// Bisections along each ray.
-    margin_bisections: u32 = 5, "", "locates an end between factors of 1/4 and 4 to 4 %";
+    margin_bisections: u32 = 5, "", "an end between the factors 1/4 and 4 is then known to 4 %";
 
     /// Transient of a pulse train that is not scored in the first comparison.
     train_from: usize = 3000, "samples", "judgement";
@@ -139,8 +140,8 @@ rules! {
     /// A motion whose range exceeds the scored range by more than half, or by more than this, is another motion.
     same_range: f64 = 0.25, "y", "judgement";
     /// The value of an optimum is the lowest value over the train itself and trains with a longer and a shorter period.
-    /// Their periods differ by 1 divided by this number.
-    detuned: u32 = 50, "samples", "judgement: a resonance sharper than 2 % does not survive on a rig";
+    /// These periods differ from that of the train by 1 / this number of it.
+    detuned: u32 = 50, "", "judgement: a resonance sharper than 2 % does not survive on a rig";
     /// Longest period of a pulse train.
     longest_period: usize = 3000, "samples", "six times the longest lag of an identification";
     /// Periods of the first grid of pulse trains.

@@ -17,10 +17,10 @@ rules! {
     /// At a known noise level an effect is left out, or replaced by lags, if the validation error rises by at most this
     /// fraction. At an unknown noise level, no effect is missing if the error of the given model is larger by at most
     /// this fraction.
-    worthwhile: f64 = 0.015, "share of the rms error", "cases without an effect in six families: noise alone \
-         reaches 0.01";
+    worthwhile: f64 = 0.015, "share of the rms error", "in cases without an effect of six families, noise alone \
+         changes the error by up to 0.01";
     /// Validation errors that differ by less than this are equal in practice.
-    alike: f64 = 0.005, "share of the rms error", "judgement: a tenth of the difference between two noise seeds";
+    alike: f64 = 0.005, "share of the rms error", "judgement: a tenth of the difference that another noise seed makes";
     /// If the final model is above the noise level, effects are named under two conditions: they explain at least
     /// this share of the unexplained variance, and the remaining error is below the rule `terms.much`. Otherwise
     /// they are surrogates.
@@ -30,20 +30,20 @@ rules! {
     explained_in_unknown_noise: f64 = 0.75, "share of the model error above the noise", "the public sets";
     /// If a model without the effects is at the noise level, effects that explain less than this share of its
     /// unexplained variance are not named.
-    most: f64 = 0.5, "share of the model error above the noise", "published flows without an effect: 28 nats of \
-         evidence, and a share of 0.30";
+    most: f64 = 0.5, "share of the model error above the noise", "on published flows without an effect, a candidate \
+         reached 28 nats of evidence and a share of 0.30";
     /// If no model without the effects is at the noise level, effects that explain at least this share are named, or
     /// reported as surrogates.
-    stands_in: f64 = 0.25, "share of the model error above the noise", "published flows: an echo with 241 nats of \
-         evidence explains 0.46";
+    stands_in: f64 = 0.25, "share of the model error above the noise", "on published flows, an echo with 241 nats of \
+         evidence explains a share of 0.46";
     /// An effect is certified although another error remains if its e-value is large enough and it explains this
     /// share of the variance that the best model without it leaves.
     certified_share: f64 = 0.7, "share of the model error above the noise", "six surrogates on simulated rigs: \
          the four right ones explained 0.72 to 1.00, the two wrong ones 0.56 and 0.62";
     /// An effect is a surrogate if the interval of each of its positive parameters spans more than this factor, or if the
     /// interval of its amplitude contains 0: the records do not determine it.
-    identified: f64 = 50.0, "times", "judgement; the interval of a wrong hysteresis beside an edge-dependent \
-         delay spanned a factor of 180; no interval of 24 right names in published flows and pairs spanned so much";
+    identified: f64 = 50.0, "times", "judgement; in a model with an edge-dependent delay, the interval of a wrong \
+         hysteresis spanned a factor of 180; among 24 right names in published flows and pairs none spanned so much";
     /// Where the level of slow noise is unknown, a model error is significant if this share of it is a function of
     /// a coordinate.
     depends: f64 = 0.1, "share of the model error above the noise", "the public sets";
@@ -58,7 +58,7 @@ rules! {
     /// is reported as missing.
     follows_a_channel: f64 = 0.25, "share of the model error above the noise", "judgement: smallest share of a surrogate";
     /// A lag shorter than this belongs to the model order and is not reported as a memory.
-    shortest_memory: usize = SHORTEST_MEMORY, "samples", "judgement: time scale of a fast flow";
+    shortest_memory: usize = SHORTEST_MEMORY, "samples", "judgement: the time scale of a fast flow at 1 kHz";
     /// If the net rate is below this share of the dominant pole's, it is a difference of lags that cancel; the pole
     /// is used instead.
     cancelled: f64 = 0.01, "share of the rate", "judgement";

@@ -185,7 +185,7 @@ pub(super) fn told(
     let place = entry.place();
     let share = |share: f64| 100.0 * share;
     let mut comment = format!(
-        "Found by `host-fit discover`: {} by {}.\nIt explains {:.0} % of the model error above the noise on the {scored}; p = {:.1e}.",
+        "Found by `host-fit discover`: {} as a function of {}.\nIt explains {:.0} % of the model error above the noise on the {scored}; p = {:.1e}.",
         entry.words(),
         written.coordinate.words(),
         share(found.formula_taken),
@@ -197,7 +197,7 @@ pub(super) fn told(
     for other in &found.alike {
         let place = other.place.word();
         comment += &format!(
-            "\nNot distinguishable on the records from a term at the {place} by {}.",
+            "\nNot distinguishable on the records from a term at the {place} that depends on {}.",
             other.coordinate
         );
     }

@@ -7,7 +7,7 @@ rules! {
     pub struct Rules in "discover";
 
     /// Largest number of points of a curve. The coordinate spends equal times between neighbouring points.
-    points: usize = 8, "", "judgement: limits the derivatives per run";
+    points: usize = 8, "", "judgement: limits the number of derivatives per run";
     /// A coordinate with fewer distinct points than this is not screened.
     fewest_points: usize = 3, "", "judgement: a curve needs more than the two points of a line";
     /// Points inserted in one round where a curve is steepest, if they lower the error enough.
@@ -15,7 +15,7 @@ rules! {
     /// Rounds of inserting points.
     refinements: usize = 2, "rounds", "judgement";
     /// Largest number of points of a curve after insertion.
-    most_points: usize = 11, "", "judgement: 1.5 times the derivatives of one run";
+    most_points: usize = 11, "", "judgement: a run then has 1.5 times as many derivatives";
     /// Share of the samples outside the first and the last point.
     beyond: f64 = 0.01, "share of the samples", "judgement";
     /// Least distance of a point to the next, relative to its distance from the first point.
@@ -37,12 +37,12 @@ rules! {
     rounds: usize = 2, "", "judgement: the second round never found anything new";
     /// The coordinate of a place's best candidate is chosen again (`rounds`) if its error is within this factor of
     /// the best.
-    in_reach: f64 = 1.5, "times the best error", "judgement: after its lags were searched, a hot jet improved \
-         from 1.5 to 1.05 × the noise level";
+    in_reach: f64 = 1.5, "times the best error", "judgement: after a search of the lags, the model with a hot jet \
+         improved from 1.5 to 1.05 × the noise level";
     /// The best candidate of a place is also compared as a formula if its error is within this factor of the best.
-    contends: f64 = 1.5, "times the best error", "the curve of a true quadratic term had 1.066 × the noise level, a curve at a wrong place 1.025";
+    contends: f64 = 1.5, "times the best error", "the curve of a true quadratic term had an error of 1.066 × the noise level, a curve at a wrong place 1.025 ×";
     /// A model within this factor of the noise level gets no further term.
-    at_the_floor: f64 = 1.02, "times the noise level", "the curve of a true jet term had 1.05 × the noise level, that of a wrong sensor term 1.09";
+    at_the_floor: f64 = 1.02, "times the noise level", "the curve of a true jet term had an error of 1.05 × the noise level, that of a wrong sensor term 1.09 ×";
     /// Curves at one place whose errors differ by less than this are the same curve.
     twins: f64 = 0.001, "share of the rms error", "equal coordinates differ by rounding only";
     /// A term must lower the validation error of the best base without it by this fraction.
@@ -72,13 +72,13 @@ rules! {
     /// Largest number of knots of a trace per record.
     knots: usize = 100, "", "judgement: limits the time";
     /// Weight of the size against the curvature in the prior of a trace.
-    smallness: f64 = 0.01, "", "judgement: the curvature over ten knots has the same weight as the size";
+    smallness: f64 = 0.01, "", "judgement: the size of the trace then has the same weight as its curvature over ten knots";
     /// A place is reported if its posterior probability is at least this.
     likely: f64 = 0.9, "probability", "convention";
     /// Longest extension of a delay.
     longest_delay_s: f64 = 0.1, "s at 1 kHz", "judgement: three times the delays of the simulated rigs";
     /// A filter time constant is fitted with a curve within this factor of its grid value.
-    time_of_a_curve: f64 = 1.7, "", "half a grid step; with a larger range a memory of y shrinks to y itself";
+    time_of_a_curve: f64 = 1.7, "", "half a grid step; with a larger range the filter time of a memory of y can shrink to 0";
     /// A filter time constant is fitted with a formula within this factor.
     time_of_a_formula: f64 = 10.0, "", "judgement";
     /// Largest change that is searched, relative or in units of y.

@@ -88,7 +88,7 @@ pub enum ExperimentError {
     },
     /// At least one model diverges under every command.
     #[error(
-        "a model diverges under every command that was tried. Identify it again with fewer lags or with `--objective free-run`."
+        "a model diverges under every command that was tried. Identify that model again with fewer lags or with `--objective free-run`."
     )]
     Unstable,
 }

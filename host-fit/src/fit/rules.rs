@@ -16,7 +16,7 @@ rules! {
     /// If a fit finds no descent, it continues with the delays held constant, at most this often.
     held_delays: usize = 3, "", "judgement: every continuation must lower the error";
     /// Iterations from every starting point before the best are chosen.
-    brief: usize = 4, "", "campaign, seed 33000: a hysteresis is found with four iterations, but not with one";
+    brief: usize = 4, "", "on a rig of the campaign with seed 33000, a hysteresis is found with four iterations, but not with one";
     /// Iterations after moving a fixed delay by one step.
     settling: usize = 3, "", "judgement";
     /// Steps by which a fixed delay is moved.
@@ -63,7 +63,7 @@ rules! {
     share_of_scatter: f64 = 0.05, "share of the variance", "judgement: a smaller scatter is negligible";
     /// The scatter of the level must vary between records by at least this. Noise that grows with the level in the same
     /// way in all records does not.
-    scatter_differs: f64 = 0.12, "share of its mean", "scatter of a level in 20 repeats: 0.3; coloured noise (40 ms) in 10 000 samples: 0.03";
+    scatter_differs: f64 = 0.12, "share of its mean", "in 20 repeats the scatter of a level varies by 0.3; in 10 000 samples coloured noise (40 ms) varies by 0.03";
     /// The remaining noise is at least this share of the variance.
     noise_beside_scatter: f64 = 0.1, "share of the variance", "judgement: a standard error from 20 repeats is \
          uncertain by 16 %";

@@ -9,7 +9,7 @@ rules! {
     /// The simulation of a candidate stops when its free run exceeds this, well below the limit of divergence.
     hopeless: f64 = 10.0, "times the largest |y|", "judgement: such candidates are never the best";
     /// A model whose validation FIT is this much below its estimation FIT is reported as over-fitted.
-    overfitted_points: f64 = 12.0, "points of FIT", "judgement: on the flow simulation models with sixteen lags lose 28 to 34 points, with two lags 7 to 11";
+    overfitted_points: f64 = 12.0, "points of FIT", "judgement: on the flow simulation models with sixteen lags lose 28 to 34 points, and models with two lags 7 to 11";
 
     /// Longest lag and input delay.
     longest_lag: u16 = 500, "samples", "the paper";
@@ -32,7 +32,7 @@ rules! {
     /// Lags that a kick of the free-run search replaces.
     kicked_lags: usize = 2, "lags", "tuned on sets 1 to 3 of docs/search.md";
     /// Least distance between a lag and its replacement in a kick of the free-run search.
-    kick_distance: u16 = 4, "samples", "a descent reaches nearer lags by itself";
+    kick_distance: u16 = 4, "samples", "the descent reaches nearer lags without a kick";
     /// Number of predicted minima per slot that are simulated.
     minima: usize = 7, "lags", "judgement";
     /// A predicted minimum is simulated if it is below this.

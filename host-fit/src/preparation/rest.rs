@@ -415,7 +415,9 @@ impl fmt::Display for MovingZero {
         let [lowest, highest] = [lowest, highest].map(|level| significant(*level, digits));
         let where_read = match self.by_rests {
             true => "at rest",
-            false => "without command, by a second-order response fitted to whole records,",
+            false => {
+                "without command (estimated by a second-order response fitted to whole records)"
+            }
         };
         write!(
             f,

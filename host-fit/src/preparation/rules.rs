@@ -19,11 +19,11 @@ rules! {
 
     /// y responds to the command of its own row if the response in that row is between these shares of the response
     /// in the first three rows.
-    own_row: [f64; 2] = [0.25, 2.0], "share of the response", "a shift by one row has a share of 1, the mean over a row 0.5, a direct part in y above 5";
+    own_row: [f64; 2] = [0.25, 2.0], "share of the response", "a shift by one row gives a share of 1, a mean over a row gives 0.5, and a direct part of u in y gives more than 5";
 
     /// A record rests until its first edge plus this share of the dead time. An earlier response belongs to an edge
     /// before the record.
-    surely_before: f64 = 0.6, "dead times", "on the bundled flows, state-dependent delays vary by less";
+    surely_before: f64 = 0.6, "dead times", "the state-dependent delays of the bundled flows vary by less";
     /// A channel that keeps each value for at least this many samples on average counts as switched. A record rests
     /// at most until the channel switches.
     switched: usize = 20, "samples", "judgement: measured quantities change at almost every sample";
@@ -35,11 +35,11 @@ rules! {
     /// reference response (an unsteady flow moves by itself), and `motion-over-noise`.
     motion_unexplained: f64 = 0.5, "times its rms", "the flow simulation moves under a constant command";
     /// y counts as moving if its motion also exceeds this many times the residual variance.
-    motion_over_noise: f64 = 40.0, "times", "judgement: noise with a memory of 10 samples stays below";
+    motion_over_noise: f64 = 40.0, "times", "judgement: noise with a memory of 10 samples stays below this";
     /// Short rests under one command do not count if their levels differ by more than this.
     rests_apart: f64 = 0.03, "share of the range of y", "judgement: noise shifts the mean of a few samples by less";
     /// Length of a record's start from which it is decided whether the record begins with an edge of the command.
-    early: f64 = 2.5, "dead times", "later parts of the two responses are alike";
+    early: f64 = 2.5, "dead times", "later, the responses with and without an edge are similar";
     /// A record begins with an edge if the response to the edge leaves less than this share of the residual of a
     /// relaxation to rest.
     answer: f64 = 0.95, "share of the sum of squares", "judgement: both responses have equally many parameters, but the dead time of one of them is given";
@@ -47,7 +47,7 @@ rules! {
     most_followed: usize = 4, "times shorter than the record", "judgement";
     /// In mid-run, free runs also follow the measurement until slow components have decayed, at most for this share
     /// of a record.
-    followed_share: usize = 10, "times shorter than the record", "if the initial state of a slow wake is unknown, following for the dead time alone leaves the true model at 1.11 × the noise level";
+    followed_share: usize = 10, "times shorter than the record", "if the initial state of a slow wake is unknown and the run follows the measurement for the dead time only, the true model has 1.11 × the noise level";
 
     /// If the largest graded command lies between this and 1, commands are fractions of a full jet of 1.
     share_of_full: f64 = 0.5, "u", "graded commands with random levels rarely reach the full jet; a supply voltage is rarely below 1 V";
@@ -61,7 +61,7 @@ rules! {
     slow_noise: f64 = 0.0075, "share of the range of y", "judgement: slow noise shifts the mean of half a \
          second by less than four times this";
     /// The sensor's offset varies between records if their rest levels differ significantly and by more than this.
-    moving_zero_noise: f64 = 4.0, "noise rms", "slow noise reached 2.9 in 30 sets";
+    moving_zero_noise: f64 = 4.0, "noise rms", "slow noise reached 2.9 noise rms in 30 sets";
     /// The sensor's offset also varies if the F-test of the scatter of the rest levels against the noise of a rest
     /// gives this p-value.
     moving_zero_p: f64 = 0.01, "p-value", "convention; in 34 sets without an offset, p was spread evenly from 0.07 to 1";

@@ -11,7 +11,7 @@ rules! {
     above_level: f64 = 0.001, "p-value", "convention; tested by `a_perfect_model_has_nothing_to_explain` and `pure_noise_explains_nothing`";
     /// The error is above the noise only if the unexplained variance is at least this share of the noise
     /// variance, the uncertainty of `y_sd`.
-    least_excess: f64 = 0.05, "share of the noise energy", "a standard deviation from 20 repeats has an error of 16 %, from 800 samples 2.5 %, i.e. 5 % of the variance";
+    least_excess: f64 = 0.05, "share of the noise energy", "a standard deviation from 20 repeats has an error of 16 %, and one from 800 samples 2.5 %, which is 5 % of the variance";
     /// Block length in correlation times; blocks count as independent.
     correlation_times: f64 = 8.0, "correlation times", "tested in `the_p_value_is_calibrated_for_coloured_errors`";
     /// Shortest block.
@@ -41,7 +41,7 @@ rules! {
     /// A window at least this long changes more slowly than y, so the gain may depend on it.
     slow_window: usize = 1000, "samples", "judgement: four windows of ỹ";
     /// Longest cycle of pulses that is tried.
-    longest_cycle: usize = 8, "pulses", "judgement; the missing-pulse plants drop one in 3 to 5";
+    longest_cycle: usize = 8, "pulses", "judgement; the test plants with missing pulses drop one pulse in 3 to 5";
     /// An input that changes at more samples than this share is not piecewise constant.
     most_changes: f64 = 0.2, "share of the samples", "judgement: on/off commands change at far fewer samples, continuous ones at nearly all";
 

@@ -99,7 +99,7 @@ fn sentence(found: &Where) -> String {
     }
     let how = match found.dependence {
         Some(Dependence::Proportion) => ", in proportion to y",
-        Some(Dependence::Size) => ", in its magnitude, not its sign",
+        Some(Dependence::Size) => ", but only its magnitude, not its sign",
         Some(Dependence::Dwell) => ", together with the length of the preceding rest or pulse",
         Some(Dependence::Mean) | None => "",
     };

@@ -310,7 +310,7 @@ fn where_it_enters(trace: &Trace) -> String {
     let odds = odds.collect::<Vec<_>>().join(", ");
     match trace.place {
         Some(place) => format!(
-            "The error enters at the {}, whatever it depends on (posterior: {odds}).",
+            "The error enters at the {} (posterior: {odds}). This result assumes nothing about the quantity on which the error depends.",
             place.word()
         ),
         None => format!(

@@ -151,7 +151,7 @@ pub enum StepError {
     },
     /// The model diverges under this command.
     #[error(
-        "the model's free run diverges at t = {time_s} s of {place}: it is unstable for this command; \
+        "the model's free run diverges at t = {time_s} s of {place}: the model is unstable for this command; \
          identify it again, with fewer lags or `--objective free-run`"
     )]
     Diverges {

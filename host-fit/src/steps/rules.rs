@@ -56,7 +56,7 @@ pub fn rules_pages() -> Vec<(String, String)> {
     let mut head = "# Rules: every threshold, what it decides and where it comes from\n\n\
          Written by `BLESS=1 cargo test --release -p host-fit --test rules_page` from the code; `host-fit rules` prints the same.\n\
          `--set NAME=VALUE` on any command gives a rule another value for that run (NAME is `group.rule`, or the rule alone).\n\n\
-         A value is either a convention, was tuned on the data that is named, or is a judgement: nothing was measured for it.\n\n\
+         A value is a convention, or it was tuned on the named data, or it is a judgement without measurements.\n\n\
          | group | rules | subject |\n|---|---|---|\n"
         .to_owned();
     let mut pages = Vec::new();

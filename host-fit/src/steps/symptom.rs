@@ -113,14 +113,14 @@ const SYMPTOMS: [Symptom; 23] = [
     of("attachment-hysteresis")
         .shown("two stable levels of y with hysteresis between them")
         .check("raise and lower the duty cycle slowly and compare the levels of y")
-        .confused("`bouc-wen-hysteresis`: small loops inside the large one distinguish them."),
+        .confused("`bouc-wen-hysteresis`: small loops inside the large loop distinguish the two effects."),
     of("amplitude-saturation")
         .shown("a rate of change that depends on the cube of y")
         .check("repeat one pulse train at several free-stream velocities"),
     of("bouc-wen-hysteresis")
         .shown("a smooth hysteresis loop between y and the rate at which y returns to its level")
         .check("raise and lower the duty cycle slowly and compare the levels of y")
-        .confused("`attachment-hysteresis`: small loops inside the large one distinguish them."),
+        .confused("`attachment-hysteresis`: small loops inside the large loop distinguish the two effects."),
     of("dry-friction")
         .shown("a constant resistance against the motion of y")
         .check("increase the command slowly from 0 and look for a dead zone"),
@@ -155,7 +155,7 @@ const SYMPTOMS: [Symptom; 23] = [
              warming up distinguishes them.",
         ),
     of("electrical-pickup")
-        .shown("a share of the command in the reading without any delay")
+        .shown("a share of the command in the reading, delayed by at most two samples")
         .check("play the command with the air shut off: the reading still follows it"),
     of("sensor-saturation")
         .shown("a reading with a fixed limit")

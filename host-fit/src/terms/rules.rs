@@ -7,7 +7,7 @@ rules! {
     pub struct Rules in "terms";
 
     /// Penalty per parameter of a term, as a share of the validation rms error.
-    price: f64 = 0.004, "share of the rms error", "null cases of six families: a superfluous parameter gains 0.001 to 0.003 on coloured noise of 20 repeats";
+    price: f64 = 0.004, "share of the rms error", "in cases without an effect of six families, a superfluous parameter lowers the error by 0.001 to 0.003 on coloured noise of 20 repeats";
     /// Free runs are not restarted, whatever the poles of the given model, if the first-order reference explains at
     /// least this share with a time constant well below the length of the records.
     self_regulates: f64 = 0.5, "share of the variance", "judgement: half";
@@ -26,8 +26,8 @@ rules! {
     /// Delays between samples are rounded to whole samples if the error rises by no more than this.
     rounding: f64 = 0.015, "share of the rms error", "equal to the practical margin of effects";
     /// An effect with a parameter this close to the end of its range is a surrogate.
-    bound: f64 = 0.01, "share of the range", "without it, vortex shedding with damping ratio 0.95 was named on \
-         a flow with a second lag";
+    bound: f64 = 0.01, "share of the range", "without this rule, vortex shedding with a damping ratio of 0.95 was \
+         named on a flow with a second lag";
     /// Number of rounds of screening and refitting.
     rounds: usize = 6, "", "models with two effects and two memories need three rounds";
     /// The search ends after this many rounds without a gain.
@@ -44,7 +44,7 @@ rules! {
     /// Proposals with effects that are refitted per model and round.
     with_effects: usize = 5, "", "the true effect was among the first three on 80 rigs of six families";
     /// Proposals without effects that are refitted per model and round.
-    without_effects: usize = 4, "", "a level-dependent rate was the fourth best proposal, behind lags";
+    without_effects: usize = 4, "", "a level-dependent rate was the fourth best candidate, after lags";
     /// Largest number of refitted proposals without effects that are of one kind.
     of_one_kind: usize = 2, "", "judgement: the fit can move the lags";
     /// Number of proposals that are refitted in full, of those fitted for a few iterations.
@@ -92,7 +92,7 @@ rules! {
     least_rise: f64 = 1.0, "samples", "rounding to whole samples hides a smaller variation";
     /// A delay law counts as a constant delay if a test at this level does not distinguish them. In the same way
     /// longer lags count as a first or second order.
-    law_level: f64 = 0.01, "p-value", "convention: 1 % of constant delays get a law";
+    law_level: f64 = 0.01, "p-value", "convention: 1 % of the plants with a constant delay get a delay law";
 
     /// Grid points along the range of a parameter if one, two, or more parameters of the effect are free.
     grid: [usize; 3] = [12, 4, 3], "", "judgement";
@@ -116,7 +116,7 @@ rules! {
     wakes_s: [f64; 5] = [0.1, 0.2, 0.4, 0.8, 1.6], "s at 1 kHz", "a geometric grid with a factor of 2";
     /// Step by which the change of the rate with the level, and the strength of a wake, are perturbed for a
     /// derivative.
-    slope: f64 = 0.1, "", "judgement: small, and far above rounding";
+    slope: f64 = 0.1, "", "judgement: small, and far above rounding errors";
     /// A term whose effect is not proportional to its amplitude must be predicted to need at least this
     /// multiple of its grid size.
     some: f64 = 0.1, "times the amplitude in the grid", "judgement";
@@ -124,7 +124,7 @@ rules! {
     ridge: f64 = 1e-4, "share of the mean square of the points", "judgement";
     /// Candidates whose changes of the free run correlate more than this are refitted as possible
     /// replacements of each other.
-    alike: f64 = 0.85, "", "theory 4.3: above it no fit of the paper's structure distinguishes the effects";
+    alike: f64 = 0.85, "", "theory 4.3: above this correlation no fit of the paper's structure distinguishes the effects";
     /// Grid points kept per effect for sets of candidates.
     kept_points: usize = 2, "", "judgement: limits the time";
     /// Lags kept per kind for sets of candidates.
@@ -144,8 +144,8 @@ rules! {
     /// Rounds of moving all lags of a model.
     lag_rounds: usize = 6, "", "judgement";
     /// Fit iterations after each move of the lags.
-    lag_iterations: usize = 1, "iterations", "needed far from the noise level, where lags do not move \
-         otherwise (buck converter, ball screw, flow over a ramp)";
+    lag_iterations: usize = 1, "iterations", "needed if the error is far above the noise level, because the lags do \
+         not move otherwise (buck converter, ball screw, flow over a ramp)";
     /// Least gain for which a move of the lags is accepted.
     lag_gain: f64 = 1e-4, "share of the mean square error", "judgement";
     /// Level of y at which delay laws are compared if no level is given.
@@ -155,7 +155,7 @@ rules! {
     /// pieces of them.
     fewest_pieces: usize = 8, "", "judgement: the scatter of fewer pieces is uncertain by more than a third";
     /// Bootstrap resamples of the validation samples: records first, then blocks.
-    resamples: usize = 400, "", "the shares are then accurate to 0.025";
+    resamples: usize = 400, "", "the standard error of a share is then at most 0.025";
     /// A model is excluded if its share of won resamples is smaller than the share of the best model by more than this
     /// value divided by √2.
     inflation: f64 = 0.1, "share of the resamples", "the ε of the inflated argmax (Adrian, Soloff and Willett, arXiv 2410.18268)";

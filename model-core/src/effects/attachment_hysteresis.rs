@@ -55,7 +55,7 @@ impl<T: Real> Physics<T> for AttachmentHysteresis<T> {
         rust: "attachment_hysteresis::AttachmentHysteresis",
         place: Place::Flow,
         summary: "the flow has two states; it attaches above an upper level of y and separates below a lower one",
-        equation: "relay r switches 0→1 at s > θ_hi and 1→0 at s < θ_lo; g·r is added to the drive",
+        equation: "relay r switches 0→1 at s > θ_hi and 1→0 at s < θ_lo, with θ_lo < θ_hi; g·r is added to the drive",
         parameters: &[
             Parameter::new("upper_threshold", Unit::Y, [-0.5, 2.0], &[0.4, 0.6, 0.8]).stepwise(),
             Parameter::new("lower_threshold", Unit::Y, [-0.5, 2.0], &[0.15, 0.35])

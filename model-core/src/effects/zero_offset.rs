@@ -28,7 +28,7 @@ impl<T: Real> Physics<T> for ZeroOffset<T> {
         name: "zero-offset",
         rust: "zero_offset::ZeroOffset",
         place: Place::Sensor,
-        summary: "the sensor reads a constant offset without friction gain",
+        summary: "the sensor reads a constant offset when the friction gain is 0",
         equation: "y = s + o",
         parameters: &[Parameter::new("level", Unit::Y, [-1e6, 1e6], &[0.0])],
         amplitude: Some(Amplitude::new("level", "an offset of the sensor").linear()),

@@ -80,8 +80,9 @@ pub enum ImportProblem {
     },
     /// More lost rows than can be inserted.
     #[error(
-        "at least {lost} rows are missing by the times, more than {share} % of the {rows} rows in the file, too many \
-             to fill; split the file at its gaps, or, if only the times are wrong, give --period SECONDS --ignore-time"
+        "according to the times at least {lost} rows are missing, more than {share} % of the {rows} rows in the \
+             file; these are too many to fill. Split the file at its gaps, or, if only the times are wrong, give \
+             --period SECONDS --ignore-time"
     )]
     ManyLost {
         /// Lost rows.

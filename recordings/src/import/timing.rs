@@ -291,8 +291,8 @@ fn scaled(t: &Variable, start: f64, scale: f64) -> PrintedTimes {
 fn explained(clock: &Clock, rounded: &Rounded, times: &PrintedTimes, line: Option<&u64>) -> String {
     let (span, steps) = times.span();
     let mut text = format!(
-        "times are printed in steps of {} s, so they step by {} to {} s. The sampling period is the mean, {} s \
-             / {steps} = {} s; no sample is missing",
+        "times are printed with a resolution of {} s, so their differences are {} to {} s. The sampling period is \
+             the mean, {} s / {steps} = {} s; no sample is missing",
         tidy(rounded.unit, 1e-6),
         tidy(rounded.shortest, 1e-6),
         tidy(rounded.longest, 1e-6),
@@ -303,8 +303,8 @@ fn explained(clock: &Clock, rounded: &Rounded, times: &PrintedTimes, line: Optio
         && let Some(line) = line
     {
         text.push_str(&format!(
-            " (if a sample is missing before line {line}, the only uncommon step, split the file there or give \
-                 --fill-gaps SECONDS)"
+            " (only the time step before line {line} differs; if a sample is missing there, split the file there or \
+                 give --fill-gaps SECONDS)"
         ));
     }
     text

@@ -68,7 +68,7 @@ fn recordings_are_dropped_mapped_and_identified() {
     // A command in volts is not an on/off command; the message says so and gives the remedy.
     let choose = "(() => { const f = document.getElementById('mapping').elements; f.t.value = 'Zeit'; f.u.value = 'Ventil'; f.y.value = 'Reibung'; document.querySelector('[name=validate][value=c]').checked = true; f.t.form.requestSubmit(); })()";
     page.act(choose);
-    page.until(20, "document.querySelectorAll('.record').length === 3 && document.getElementById('message').textContent.includes('“on above (of u)” 2.5') && document.querySelector('[name=u-threshold]').getAttribute('aria-invalid') === 'true'");
+    page.until(20, "document.querySelectorAll('.record').length === 3 && document.getElementById('message').textContent.includes('“u is on above” 2.5') && document.querySelector('[name=u-threshold]').getAttribute('aria-invalid') === 'true'");
     page.shoot("workbench-import.png");
     page.accessible();
     page.act("(() => { const f = document.getElementById('mapping'); f.elements['u-threshold'].value = 2.5; f.requestSubmit(); })()");

@@ -10,7 +10,7 @@ use anyhow::{Context, Result, bail};
 
 pub(crate) const TASK: Task = Task {
     name: "ci",
-    does: "runs everything of CI; continues after a failure and lists all failures at the end",
+    does: "runs all steps of CI; continues after a failure and lists all failures at the end",
     run: ci,
 };
 
@@ -200,7 +200,7 @@ fn ci(arguments: &[String]) -> Result<()> {
             .find(|step| step.name == name)
             .with_context(|| {
                 format!(
-                    "no step `{name}`; the steps are: {} (none named: all)",
+                    "there is no step `{name}`; the steps are: {}; without a name all steps run",
                     names.join(", ")
                 )
             })

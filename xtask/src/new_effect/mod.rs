@@ -152,7 +152,7 @@ fn new_effect(arguments: &[String]) -> Result<()> {
     for file in &written {
         println!("{file}");
     }
-    println!("Both have no influence yet; docs/adding-an-effect.md says what to add.");
+    println!("Both files have no influence yet; docs/adding-an-effect.md says what to add.");
     Ok(())
 }
 
@@ -235,8 +235,13 @@ pub(crate) fn write(root: &Path, name: &str, place: &str) -> Result<[String; 2]>
         let catalogue = root.join(folder).join("mod.rs");
         let old = fs::read_to_string(&catalogue)
             .with_context(|| format!("could not read {}", catalogue.display()))?;
-        let entered = entered(&old, &format!("{module} {file};"), list, &line)
-            .with_context(|| format!("{} has no place for it", catalogue.display()))?;
+        let entered =
+            entered(&old, &format!("{module} {file};"), list, &line).with_context(|| {
+                format!(
+                    "{} has no list to which the effect could be added",
+                    catalogue.display()
+                )
+            })?;
         fs::write(&path, text).with_context(|| format!("could not write {}", path.display()))?;
         fs::write(&catalogue, entered)?;
         let path = path.display().to_string();

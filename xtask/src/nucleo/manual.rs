@@ -30,7 +30,7 @@ const GROUPS: [Group; 8] = [
 pub(super) fn check(chip: &Chip) -> Result<Vec<String>> {
     ensure!(
         chip.unclocked.is_empty(),
-        "registers were used without their clock: {}",
+        "registers were used while their clock was off: {}",
         chip.unclocked.join(", ")
     );
     GROUPS
@@ -147,7 +147,7 @@ fn timer(chip: &Chip) -> Result<String> {
     );
     ensure!(
         field(chip.value(TIM2 + 0x04), 4, 3) == 0b010,
-        "TRGO is not the update"
+        "TRGO is not the timer's update event"
     );
     ensure!(chip.value(TIM2) & 1 == 1, "the timer stands still");
     let reload = first(chip, "TIM2's period", |w| w.address == TIM2 + 0x2C)?;
@@ -170,7 +170,7 @@ fn converter(chip: &Chip) -> Result<String> {
     ensure!(field(cr1, 24, 2) == 0, "not 12 bits");
     ensure!(
         cr1 >> 10 & 1 == 1 && cr1 >> 7 & 1 == 1,
-        "no injected conversion after each, or no interrupt of it"
+        "no automatic injected conversion, or no interrupt at its end"
     );
     ensure!(
         field(cr2, 28, 2) == 1 && field(cr2, 24, 4) == 0b0110,
@@ -207,7 +207,7 @@ fn pins(chip: &Chip) -> Result<String> {
     );
     ensure!(
         [2, 3].map(|pin| mode(GPIOA, pin)) == [2, 2],
-        "PA2, PA3 are not the USART's"
+        "PA2, PA3 are not assigned to the USART"
     );
     let functions = field(chip.value(GPIOA + 0x20), 8, 8);
     ensure!(functions == 0x77, "PA2, PA3 have functions {functions:#x}");
@@ -286,7 +286,7 @@ fn watchdog(chip: &Chip) -> Result<String> {
         "the watchdog restarts the board after {least} to {most} s"
     );
     Ok(format!(
-        "restart after {:.0} to {:.0} ms, over the tolerance of the watchdog's clock",
+        "restart after {:.0} to {:.0} ms, within the tolerance of the watchdog's clock",
         1e3 * least,
         1e3 * most
     ))

@@ -203,7 +203,7 @@ fn pages(lock: &Value) -> Result<Vec<Value>> {
             "version": version,
             "purl": locator,
             "licenses": [{ "expression": text("license")? }],
-            "hashes": [{ "alg": "SHA-512", "content": sum.with_context(|| format!("{PAGES}: the checksum of {name}"))? }],
+            "hashes": [{ "alg": "SHA-512", "content": sum.with_context(|| format!("{PAGES}: cannot read the checksum of {name}"))? }],
         }));
     }
     Ok(components)

@@ -152,7 +152,7 @@ pub(crate) fn rig_day(arguments: &[String]) -> Result<()> {
     let line = words("diagnose model.toml set -o better.toml --experiment experiment.csv");
     day.fit("diagnose", &line)?;
     if day.folder.join("experiment.csv").exists() {
-        day.say("Several effects are not distinguishable on these records. The command that distinguishes them is played, and the diagnosis\nrepeated.");
+        day.say("Several effects are not distinguishable on these records. The command that distinguishes these effects is played,\nand the diagnosis is repeated.");
         let rest = format!("--rig rig.toml --repeats {repeats} -o raw-2 --command experiment.csv");
         day.fit("record experiment", &port("record", "first", &rest))?;
         let period = played_period(&day.folder.join("raw-2/experiment.toml"))?;

@@ -296,7 +296,7 @@ fn reals<T: Real>(track: &Track) -> Vec<(&'static str, f64, &'static str)> {
         (
             "LAW_SETTLED",
             law.settled.value(),
-            "long-term share of the integral's rate",
+            "long-term rate of the integral relative to its initial rate",
         ),
         ("LAW_CORRECTION_LIMIT", law.correction_limit.value(), "y"),
         ("LAW_RESIDUAL_LIMIT", law.residual_limit.value(), "y"),

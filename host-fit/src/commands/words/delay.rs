@@ -126,7 +126,7 @@ fn dead_time_words(study: &DelayStudy, period: f64) -> String {
                 )
             };
             format!(
-                "from {}, {order} (sum of time constants {sum}); the interval covers both orders",
+                "from {}, {order} (sum of time constants {sum}); the interval allows for first and second order",
                 study.method.words()
             )
         }
@@ -135,8 +135,8 @@ fn dead_time_words(study: &DelayStudy, period: f64) -> String {
             study.method.words()
         ),
         _ => format!(
-            "from {}; one plant does not fit the records. The interval includes the variation with --reach \
-                 (here {} samples, {} s)",
+            "from {}; one plant does not fit the records. The interval includes the change of the result with \
+                 --reach (here {} samples, {} s)",
             study.method.words(),
             study.reach,
             brief(study.reach as f64 * period)

@@ -45,7 +45,7 @@ fn track_words(design: &TrackDesign, period_s: f64) -> String {
     let law = &design.law;
     let ms = |samples: u32| milliseconds(samples.into(), period_s);
     let mut text = format!(
-        "holds {} of the interval ({:.3}, {:.3}); duty {:.3} on the model, u_eq = {:.3}\n\
+        "holds {} inside the interval ({:.3}, {:.3}); duty {:.3} on the model ({:.3} by the formula for u_eq)\n\
          shortest times {} ms open, {} ms closed; predicts up to {} ms ahead{}",
         design.target,
         design.reachable[0],
@@ -70,8 +70,8 @@ fn track_words(design: &TrackDesign, period_s: f64) -> String {
 fn certificate_words(certificate: &Certificate) -> String {
     match certificate {
         Certificate::Bound(bound) => format!(
-            "certificate: on the model the flow ends within −{:.3} … +{:.3} of the target from any start; with a prediction \
-             error of {:.3} within −{:.3} … +{:.3}",
+            "certificate: from any initial state, y of the model ends between {:.3} below and {:.3} above the target; with \
+             a prediction error of {:.3}, between {:.3} below and {:.3} above",
             bound.below, bound.above, bound.error, bound.below_with_error, bound.above_with_error
         ),
         Certificate::None { reason } => {
@@ -116,7 +116,7 @@ fn optimum_words(optimum: &Optimum, period_s: f64) -> String {
     text.push('\n');
     text.push_str(&weighed_words(&optimum.weighed, law.period == 1));
     text.push_str(&format!(
-        "\nafter {}: mean y {:.3}; with a period that is 2 % off: mean y {:.3}; pole moduli {:.5} with the valve \
+        "\nafter {}: mean y {:.3}; with a period that differs by 2 %: mean y {:.3}; pole moduli {:.5} with the valve \
             closed, {:.5} with it open",
         duration(RULES.long_until, period_s),
         optimum.mean_after_minutes,
@@ -131,13 +131,13 @@ fn optimum_words(optimum: &Optimum, period_s: f64) -> String {
     }
     if let Some(mean) = optimum.refused_mean {
         text.push_str(&format!(
-            "\nrejected: {} pulse trains with a higher mean (up to {mean:.3}) that diverge in a long run: instabilities of the model",
+            "\nrejected: {} pulse trains with a higher mean (up to {mean:.3}), because the model diverges under them in a long run; they excite instabilities of the model",
             optimum.refused
         ));
     }
     if let Some(planned) = &optimum.planned {
         text.push_str(&format!(
-            "\nfree commands over {} s from rest ({}, every {:.0} ms): value {:.3} with {:.1} % of the air (steady blowing {:.3}); {}",
+            "\nbest non-periodic command over {} s from rest ({}, a decision every {:.0} ms): value {:.3} with {:.1} % of the air (steady blowing: value {:.3}); {}",
             planned.horizon_s,
             if planned.exact { "all tried" } else { "beam search" },
             1000.0 * planned.block_s,
@@ -145,10 +145,10 @@ fn optimum_words(optimum: &Optimum, period_s: f64) -> String {
             100.0 * planned.duty,
             planned.steady_value,
             match planned.cycle_s {
-                None => "with a receding horizon the valve stops switching or the model diverges".to_owned(),
+                None => "a receding-horizon law stops switching, or the model diverges under it".to_owned(),
                 Some(cycle_s) => format!(
                     "a receding-horizon law ends in a limit cycle of {:.0} ms ({:.0} % of it irregular), \
-                    which was evaluated like the other pulse trains",
+                    and this cycle was evaluated like the other pulse trains",
                     1000.0 * cycle_s,
                     100.0 * planned.irregular
                 ),
@@ -169,14 +169,14 @@ fn optimum_words(optimum: &Optimum, period_s: f64) -> String {
 /// The objective, and the reason if steady blowing is better than pulses.
 fn weighed_words(weighed: &Weighed, is_steady: bool) -> String {
     let mut text = format!(
-        "objective: mean y − {} × share of time open; the value is the lowest over periods up to 2 % off",
+        "objective: mean y − {} × share of time open; the value is the lowest over periods that differ by up to 2 %",
         weighed.air_price
     );
     let (Some(pulses), Some(steady)) = (weighed.pulses, weighed.steady_value) else {
         return text;
     };
     text.push_str(&format!(
-        "\nsteady blowing {steady:.3}; the best pulses {:.3} (mean y {:.3} with {:.1} % of the air)",
+        "\nvalue of steady blowing {steady:.3}; value of the best pulses {:.3} (mean y {:.3} with {:.1} % of the air)",
         pulses.value,
         pulses.mean,
         100.0 * pulses.duty
@@ -209,7 +209,7 @@ impl Words for Margin {
             )
         });
         format!(
-            "robustness margin, one error at a time: {}. Inside it attachment is kept and the rms error stays below twice {:.3}",
+            "robustness margin, one error at a time: {}. Inside this margin attachment is kept, and the rms error stays below twice the {:.3} on the model",
             each.collect::<Vec<_>>().join(", "),
             self.rms
         )

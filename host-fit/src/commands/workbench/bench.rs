@@ -202,7 +202,7 @@ impl ModelBench {
     fn idle(&self) -> Result<(), Refusal> {
         match self.busy.load(Ordering::Relaxed) {
             true => Err(Refusal(
-                "a step runs on these records: wait for it, or cancel it".to_owned(),
+                "a task is running on these records: wait until it ends, or cancel it".to_owned(),
             )),
             false => Ok(()),
         }

@@ -64,7 +64,7 @@ function draw() {
   }
   const form = el("form", { id: "mapping", class: "fields", onsubmit: submit },
     choice("t", "time"), choice("u", "command u"), choice("y", "output y"),
-    number("u-threshold", "on above (of u)"), number("y-scale", "factor of y"), number("y-offset", "added to y"),
+    number("u-threshold", "u is on above"), number("y-scale", "factor of y"), number("y-offset", "added to y"),
     number("period", "period (s), if no time"), number("fill-gaps", "fill gaps up to (s)"), number("hold-out-from", "validation from (s)"),
     el("label", {}, "title", el("input", { type: "text", name: "title" })),
     el("label", { class: "check" }, el("input", { type: "checkbox", name: "graded" }), "levels between off and on"),

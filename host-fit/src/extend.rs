@@ -178,8 +178,8 @@ pub fn extend(
     })
 }
 
-/// `base` with all effects, refitted. The first of two effects may be fitted to imitate the second and stay there:
-/// both orders are tried.
+/// `base` with all effects, refitted. The effects are added one after the other. The first one may be fitted such
+/// that it imitates the second, so the reverse order is tried too.
 fn with_all(
     search: &Search<'_>,
     base: &Model,

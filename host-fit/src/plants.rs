@@ -164,7 +164,7 @@ struct Circumstances {
     noise: f64,
     lost: Lost,
     seed: u64,
-    /// The model's units, time included, in the simulator's.
+    /// Conversion between the units of the simulator and those of the model, time included.
     units: Units,
 }
 

@@ -89,7 +89,7 @@ pub fn detectable(model: &Model, records: &[Record]) -> Result<Vec<Detectable>, 
 
 /// The threshold for naming an effect.
 struct Asked {
-    /// Standard deviations of the amplitude's estimate.
+    /// Least amplitude, in standard deviations of its estimate.
     deviations: f64,
     /// Threshold on the energy, as a share of the energy of the validation error.
     share: f64,
@@ -99,9 +99,10 @@ struct Asked {
 
 impl Asked {
     fn of(judge: &Judge, given: &Model, held_out: &HeldOut) -> Self {
-        // The effect must exceed the price of the test's level, of the number of models tried, and of the
-        // coefficients of the model without it, because all of these coefficients change to imitate the effect. An
-        // amplitude t standard deviations from 0 has an evidence of t²/2 nats, with standard deviation t.
+        // The evidence of the effect must exceed a penalty for the level of the test, for the number of models
+        // tried, and for the coefficients of the model without it, because all of these coefficients change to
+        // imitate the effect. An amplitude t standard deviations from 0 has an evidence of t²/2 nats, with
+        // standard deviation t.
         let likely = MostLikely::of(judge, given);
         let prior = likely.and_then(|likely| Some(likely.log_likelihood - likely.evidence(judge)?));
         let nats = prior.unwrap_or(0.0) - NAMED.level_of_search.ln() + (SPECS.len() as f64).ln();

@@ -10,7 +10,7 @@ use crate::real::Real;
 /// Samples W of the averages in the paper, eqs. (1), (12) and (13).
 pub const WINDOW: u32 = 250;
 
-/// The sum of the last `terms` samples, sample by sample.
+/// Running sum of the last `terms` samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WindowSum<T> {
     running: TwoWords<T>,

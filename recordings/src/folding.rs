@@ -19,7 +19,7 @@ struct Waiting {
 /// The state of an average: the samples of the running period and the sums of the complete ones.
 #[derive(Debug)]
 pub(super) struct Folding {
-    /// Exact samples per period; the buffer works with whole ones.
+    /// Exact number of samples per period; the buffer works with the rounded number.
     exact_length: f64,
     length: usize,
     width: usize,

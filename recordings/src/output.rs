@@ -110,7 +110,7 @@ fn target(path: &Path) -> Result<PathBuf, OutputError> {
     Ok(target)
 }
 
-/// An empty file next to `target`, which is removed with the value.
+/// An empty file next to `target`, which is deleted when the returned value is dropped.
 fn temporary(target: &Path) -> io::Result<tempfile::NamedTempFile> {
     permitted(tempfile::Builder::new().prefix(".host-fit-"), 0o666)
         .tempfile_in(parent_of(target))

@@ -86,7 +86,7 @@ impl PrintedTimes {
 
     /// Whether times k·period + offset, rounded like the printed ones, reproduce all printed times. In addition each
     /// time may deviate by the allowance for uneven steps. A few uncommon steps are evidence of rounding only if the
-    /// clock counts whole seconds; a repeated time of such a clock is not.
+    /// clock counts whole seconds; a repeated time of such a clock is not evidence of rounding.
     fn rounded(&self) -> Option<Rounded> {
         let last = self.time.len().checked_sub(1).filter(|&n| n >= 2)?;
         let unit = self.resolution();
@@ -211,7 +211,8 @@ impl PrintedTimes {
         let middle = steps.len() / 2;
         let median = *steps.select_nth_unstable_by(middle, f64::total_cmp).1;
         let rounding = |row: usize| self.unit[row - 1].max(self.unit[row]);
-        // A period that fits no step is a wrong statement, not a gap in row 2.
+        // If the stated period fits no step, the statement is wrong; the error must not report a
+        // gap in row 2.
         if let Some(stated) = stated
             && (median - stated.period_s).abs() > tolerance(stated.period_s, rounding(1))
         {

@@ -33,7 +33,7 @@ pub struct Plan {
     pub test: Test,
 }
 
-/// A moment of the loop.
+/// State of the closed loop at one sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Now {
     /// Time, s.
@@ -127,7 +127,8 @@ const SILENCE: Duration = Duration::from_secs(2);
 const NOTHING_NEW: Duration = Duration::from_secs(10);
 /// Errors and air are computed from this time after arming on, s; before it the flow is far from y*.
 const SETTLING_S: f64 = 1.0;
-/// They also begin only after this many samples, because flows are slow at a long sample period.
+/// Errors and air are computed only after at least this many samples, because flows are slow at a
+/// long sample period.
 const SETTLING: u64 = 1000;
 
 /// Weight of a residual in the average that the board compares with its limit.

@@ -322,7 +322,7 @@ impl NoiseKind {
     }
 }
 
-/// Frequencies (Hz) and duties of five different squares.
+/// Frequencies (Hz) and duties of five different square waves.
 pub(super) fn squares(rng: &mut ChaCha8Rng) -> Vec<(f64, f64)> {
     let mut all = vec![
         (2.0, 0.3),

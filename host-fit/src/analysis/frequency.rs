@@ -243,7 +243,7 @@ fn degrees(value: Complex<f64>) -> f64 {
     value.arg().to_degrees()
 }
 
-/// `phase` plus the multiple of 360° that is nearest to `near`, degrees.
+/// The angle nearest to `near` among `phase` and its sums with multiples of 360°, degrees.
 fn nearest(phase: f64, near: f64) -> f64 {
     phase + 360.0 * ((near - phase) / 360.0).round()
 }
@@ -355,7 +355,8 @@ mod tests {
         let (mut gain, mut phase, mut all) = (0.0, 0.0, 0.0);
         for _ in 0..60 {
             let found = estimated_response(&residuals(&mut rng, 1.0), 1.0, 31);
-            // Bands that are coherent with any noise; others are shown if noise adds to the coherence.
+            // Bands below 2.5 Hz are coherent whatever the noise is; the others appear only if the
+            // noise happens to add to the coherence.
             for point in found.iter().filter(|point| point.measured.hz < 2.5) {
                 // The same estimate without noise is the truth apart from the resolution.
                 let exact = point.run;

@@ -45,7 +45,8 @@ impl InitialState {
         known: Range<usize>,
     ) -> Self {
         let mut beginning = FEWEST.max((SHARE * samples as f64) as usize);
-        // Doubled, so that it does not change with small changes of the time constant.
+        // The interval is doubled, so that it does not change with small changes of the time
+        // constant.
         while (beginning as f64) < (LONGEST * samples as f64).min(2.0 * fastest) {
             beginning *= 2;
         }

@@ -295,7 +295,8 @@ fn fits(learned: &[&Record], judged: &[&Record]) -> (Baselines, BaselineFits) {
     (found, fits)
 }
 
-/// The numbers of `strangers`, computed elsewhere by least squares.
+/// The FIT agrees with the values in `strangers`, which were computed independently by least
+/// squares.
 #[test]
 fn records_of_strangers_have_the_published_fits() {
     let Some(folder) = beside("strangers") else {

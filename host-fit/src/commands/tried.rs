@@ -60,7 +60,7 @@ impl Tried {
         }
     }
 
-    /// With the answer: whether the law keeps attachment, in which trials, with which margin.
+    /// Adds the answer: whether the law keeps attachment, in which trials, and with which margin.
     pub(super) fn answered(self) -> Self {
         let answer = self.concluded();
         Self { answer, ..self }

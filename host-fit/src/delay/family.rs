@@ -383,7 +383,8 @@ fn nothing_that_moves_gives_edges_without_a_dead_time() {
     assert!(noisy.dead_time.is_none(), "{:?}", noisy.dead_time);
 }
 
-/// A command of 2000 samples that is held for 30 to 170, and a normal deviate for each sample.
+/// A command of 2000 samples whose levels last 30 to 170 samples, and a normal deviate for each
+/// sample.
 fn switched(seed: u64) -> (Vec<f64>, Vec<f64>) {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let (mut u, mut level) = (vec![0.0; 60], 0.0);

@@ -21,7 +21,8 @@ const COARSE_STEP: f64 = 1.5;
 const COARSE_RATIOS: [f64; 2] = [0.0, 0.2];
 /// Number of grid minima, over the time constants, that are refined.
 const COARSE_STARTS: usize = 3;
-/// Time constant of a response within one sample, samples, and delays before it that the grid search tries.
+/// Time constant of a response within one sample, in samples, and number of delays that the grid search
+/// tries with it.
 const IMMEDIATE: f64 = 0.2;
 const IMMEDIATE_DELAYS: usize = 300;
 /// Largest ratio: damping ratio 0.05.

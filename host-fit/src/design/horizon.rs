@@ -2,8 +2,8 @@
 //!
 //! A beam search over blocks of samples. A partial command is ranked by its better completion: the valve
 //! open, or closed, to the end of the horizon, as soon as its hold time allows. The rank is therefore the
-//! value of a complete command, with everything still in the delay counted, and the best completion met is
-//! the answer. If the beam never dropped a command, the answer is exact.
+//! value of a complete command, including the part that is still in the delay. The best completion found
+//! is the answer. If the beam never dropped a command, the answer is exact.
 
 use super::bench::Player;
 use super::rules::RULES;

@@ -495,7 +495,7 @@ impl TrainSearch {
         if *train != Train::steady() {
             let off = train.period.div_ceil(RULES.detuned);
             for period in [train.period - off, train.period + off] {
-                // Same duty, as for a slower or faster flow.
+                // The duty stays the same, as if the flow were slower or faster.
                 let stretched = train.stretched(period);
                 let near = self.long_run(&stretched);
                 detuned = detuned.min(near.as_ref().map_or(f64::NEG_INFINITY, |n| n.0.mean));

@@ -73,8 +73,8 @@ pub struct Case {
     /// Lowest mean of the friction over 250 samples (250 ms at 1 kHz).
     #[serde(rename = "lowest_mean")]
     pub lowest: f64,
-    /// Whether the flow stays attached where steady blowing keeps it so: the lowest mean exceeds half of the
-    /// target or of the level under steady blowing.
+    /// Whether the flow stays attached if steady blowing keeps it attached: the lowest mean exceeds half of
+    /// the target or of the level under steady blowing.
     pub kept: bool,
 }
 

@@ -57,7 +57,7 @@ rules! {
     /// Anticipations that are tried in turn while the rms error on the model falls.
     anticipations: [f64; 6] = [0.85, 0.7, 0.55, 0.4, 0.2, 0.0], "of half a shortest time", "a grid; a flow that settles within \
          a shortest time m reaches its centre after τ·ln(2/(1 + e^(−m/τ)))";
-    /// The rms error must fall by this share.
+    /// A smaller anticipation is preferred if it lowers the rms error by at least this share.
     anticipated: f64 = 0.005, "share of the rms error", "judgement";
     /// Switches that the budget can accumulate. With fewer than those of two pulses, a valve that was open for a
     /// long time would have to stay closed until the budget recovers.
@@ -90,7 +90,8 @@ rules! {
 
     /// A plant is possible unless the one-sided p-value of the records is below this.
     not_excluded: f64 = 0.025, "p-value", "convention: the ends of intervals of 95 %";
-    /// Steps, each by a fifth, in which the end of an interval is searched inwards from 1.96 standard errors.
+    /// Number of steps in which the end of an interval is searched inwards from 1.96 standard errors; each
+    /// step shortens the interval by a fifth.
     interval_steps: u32 = 20, "", "judgement: the last step is at 1/70 of 1.96 standard errors";
     /// Gauss–Newton steps of the refit for a possible plant.
     refitting_steps: usize = 5, "", "judgement";
@@ -130,7 +131,7 @@ rules! {
     train_from: usize = 3000, "samples", "judgement";
     /// Least scored length in the first comparison.
     train_judged: usize = 5000, "samples", "judgement";
-    /// Start of the scored part of a long run, which lasts as long again.
+    /// Start of the scored part of a long run. The scored part is as long as the part before it.
     long_from: usize = 20_000, "samples", "20 s to 40 s at 1 kHz";
     /// End of a long run, at which the motion must be unchanged.
     long_until: usize = 240_000, "samples", "four minutes at 1 kHz";

@@ -517,8 +517,8 @@ pub(super) mod tests {
         assert_eq!(design.law.switches, Some([50, 10]));
     }
 
-    /// A flow that settles within the shortest times, held at half of steady blowing: no square wave with these times
-    /// has less ripple than the one of equal parts, which swings between e^{−m/τ} times and once its upper end.
+    /// A flow that settles within the shortest times, held at half of steady blowing: the square wave with equal on
+    /// and off times has the least ripple. It swings between its upper end and e^{−m/τ} times that value.
     #[test]
     fn the_ripple_is_least_for_times_longer_than_the_flow_takes() {
         let (tau, shortest) = (20.0_f64, 40.0);

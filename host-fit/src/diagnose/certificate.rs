@@ -60,7 +60,7 @@ pub struct Parsimony {
     pub effects: Vec<String>,
     /// ln of the evidence of the final model minus that of the given model, nats.
     pub nats: f64,
-    /// Number of coefficients and parameters that the final model has fewer than the given one.
+    /// By how many coefficients and parameters the final model is smaller than the given one.
     pub terms_fewer: usize,
 }
 

@@ -258,7 +258,7 @@ struct BlockRun<'a> {
     keep: Option<&'a mut Trajectory>,
 }
 
-/// Terms of ỹ's sum, eq. (1).
+/// Number of terms in the sum of ỹ, eq. (1).
 const AVERAGED: usize = WINDOW as usize - 1;
 
 impl BlockRun<'_> {

@@ -327,8 +327,8 @@ impl Model {
         longest.clamp(0.0, bounds::LONGEST.into()).round() as usize
     }
 
-    /// Makes delays unrounded, so that a fit can vary them: after an edge, y changes by several times the noise per
-    /// sample.
+    /// Makes delays unrounded, so that a fit can vary them. A delay that changes by a whole sample would change y
+    /// after an edge by several times the noise.
     pub(crate) fn delay_between_samples(&mut self) {
         match &mut self.delay {
             Delay::Law(law) => law.interpolated = true,

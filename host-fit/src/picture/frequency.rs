@@ -54,8 +54,9 @@ const BETWEEN: f64 = 20.0;
 /// A point of one panel with its limits: logarithm of the frequency, value, lower and upper limit.
 type Measured = (f64, f64, [f64; 2]);
 
-/// Draws magnitude and phase of frequency responses. Returns SVG. More than 60 dB below the largest magnitude, and more than
-/// 720° below the largest phase, nothing is drawn: so small a response is rounding and leakage of the window.
+/// Draws magnitude and phase of frequency responses. Returns SVG. Nothing is drawn more than 60 dB below the largest
+/// magnitude or more than 720° below the largest phase, because so small a response is only rounding and leakage of the
+/// window.
 #[must_use]
 pub fn frequency(plot: &FrequencyPlot<'_>) -> Picture {
     let description = format!("{}: magnitude and phase against frequency", plot.title);

@@ -176,7 +176,8 @@ impl Report {
         columns: &[Column<'_>],
         rows: &[Vec<S>],
     ) -> &mut Self {
-        // Not within the table, which may be wider than a phone: a caption is not scrolled to be read.
+        // The caption is outside the table element: a table may be wider than a phone, but its caption
+        // must be readable without scrolling.
         if !caption.is_empty() {
             self.push(format_args!("<p class=\"caption\">{}</p>", inline(caption)));
         }

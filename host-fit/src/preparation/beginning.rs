@@ -151,7 +151,8 @@ impl Beginning {
             });
             each.min_by(|a, b| a.1.left.total_cmp(&b.1.left))
         };
-        // The samples before or just after the start of the response decide between the two.
+        // The samples before and just after the start of a response decide between a relaxation and
+        // a response to an edge.
         let early = &y[..window.min((RULES.early * dead_time).ceil() as usize + 5)];
         let (Some(relaxes), Some(relaxes_early)) = (relaxing(y), relaxing(early)) else {
             return in_mid_run(dead_time, time);

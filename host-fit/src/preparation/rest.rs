@@ -228,7 +228,7 @@ pub struct MovingZero {
     pub lowest: (String, f64),
     /// The record that rests highest, and its level, y.
     pub highest: (String, f64),
-    /// Variance of the zeros themselves.
+    /// Variance of the offsets themselves, without noise.
     zeros: f64,
     /// Variance of noise that is constant throughout a rest.
     slower: f64,

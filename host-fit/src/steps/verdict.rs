@@ -259,7 +259,8 @@ fn fall(diagnosis: &Diagnosis, with: &str) -> String {
     }
 }
 
-/// The step of the ladder with the fewest lags, if the given model fits as well as the final one: it imitates the effects.
+/// The step of the ladder with the fewest lags, if the given model fits as well as the final one. The given model then
+/// imitates the effects.
 fn imitated(diagnosis: &Diagnosis) -> Option<&Rung> {
     let [given, last] = [diagnosis.ladder.first()?, diagnosis.ladder.last()?];
     let lags_do = last.validate_rmse > (1.0 - RULES.worthwhile) * given.validate_rmse;

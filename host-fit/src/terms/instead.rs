@@ -63,8 +63,8 @@ impl Search<'_> {
         };
         let proposals = self.each_effect(lean.model());
         let alone = parallel::some(&proposals, |proposal| self.alone(lean.model(), proposal));
-        // A delay by whole samples has no derivative: a fit that starts with a path of the jets ends with it. Effects are
-        // therefore fitted without such terms, too.
+        // A delay by whole samples has no derivative, so a fit that starts with a term in the jet path keeps this term.
+        // Effects are therefore fitted without such terms, too.
         let in_the_jet = |term: &Term| term.place() == Some(Place::Jet);
         let mut bases = vec![bases];
         if bases[0].iter().any(in_the_jet) {
@@ -213,7 +213,7 @@ impl Screen<'_> {
         /// The change of the free run when a term is taken away.
         struct Taken {
             index: usize,
-            /// Coordinates of the term; these cannot follow.
+            /// Coordinates of the term; these cannot compensate its removal.
             coordinates: Vec<usize>,
             /// Components along the basis.
             along: Vec<f64>,
@@ -278,8 +278,8 @@ impl Screen<'_> {
         (dropped, loss(&set))
     }
 
-    /// The squared length of what remains of a change along the basis when all parameters but those with these
-    /// coordinates follow it.
+    /// Squared length of the part of a change along the basis that remains after all parameters except those
+    /// with these coordinates have compensated it.
     fn left_by_others(&self, along: &[f64], without: &[usize]) -> f64 {
         let free = self.made_by.iter().enumerate();
         let columns: Vec<Vec<f64>> = free
@@ -290,7 +290,7 @@ impl Screen<'_> {
                 column
             })
             .collect();
-        // Fixed delays, which are the last directions, follow too.
+        // Fixed delays, which are the last directions, can compensate it too.
         let along = &along[..self.made_by.len()];
         let n = columns.len();
         let products: Vec<f64> = (0..n * n)

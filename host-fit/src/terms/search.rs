@@ -304,7 +304,8 @@ impl Search<'_> {
         if let Some(new) = new.filter(|i| open(i) && near(*i)) {
             chosen.push((new, self.effects));
         }
-        // Two lines of descent are followed until the worse one also has more parameters.
+        // The searches from both starting points continue until the worse one also has more
+        // parameters.
         let line = all[end].from_given;
         let other = leading(all, |i| all[*i].from_given != line);
         if let Some(other) = other.filter(open)

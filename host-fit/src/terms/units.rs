@@ -18,11 +18,11 @@ const PERIOD_S: f64 = 0.001;
 /// The inner units, expressed in the user's units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Units {
-    /// Sensor reading that is y = 0 inside.
+    /// Sensor reading that corresponds to y = 0 in inner units.
     pub zero: f64,
     /// Inner unit of y.
     pub y: f64,
-    /// The commands that are 0 (no jet) and 1 (full jet) inside.
+    /// The commands that correspond to 0 (no jet) and 1 (full jet) in inner units.
     pub command: CommandRange,
     /// Inner unit of time.
     pub time: f64,

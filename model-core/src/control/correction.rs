@@ -1,7 +1,7 @@
-//! Corrections of a tracking law for model errors. The low-pass-filtered error of predictions made a delay
-//! ago is added to the present ones (Smith predictor), and a slow integral removes the remaining offset. Both
-//! respond to noise as little as possible: the bias has a dead band, and the integral slows down while the
-//! bias is constant.
+//! Corrections of a tracking law for model errors. The low-pass-filtered error of predictions made one delay
+//! earlier is added to the present predictions (Smith predictor), and a slow integral removes the remaining
+//! offset. Both respond to noise as little as possible: the bias has a dead band, and the integral slows down
+//! while the bias is constant.
 
 use crate::control::constants::Tracking;
 use crate::history::{DelayLine, Memory, Past};
@@ -161,7 +161,7 @@ mod tests {
         assert_eq!(after(1000, 12, true).integral, -0.3);
     }
 
-    /// The relative integral rate after this many samples of a prediction error `missed` with a ripple of 0.01.
+    /// The corrections after `samples` samples with a constant prediction error `missed` and a ripple of 0.01.
     fn learnt(law: &Tracking<f64>, samples: u32, missed: f64) -> Correction<f64, 8> {
         let mut correction = Correction::none();
         for k in 0..samples {
@@ -190,7 +190,7 @@ mod tests {
         }
         assert!((wrong.bias - 0.08).abs() < 1e-3, "{}", wrong.bias);
         assert!(wrong.share > 0.8, "{}", wrong.share);
-        // Another reference resets it as well.
+        // A new reference resets the integral rate as well.
         let mut other = quiet;
         other.update(&law, 0.6, 0.6, Some(0.0), 0.6, (true, 0));
         assert!(other.share > 0.98, "{}", other.share);

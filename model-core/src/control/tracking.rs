@@ -248,7 +248,7 @@ impl<T: Real> Tracking<T> {
         } = self.anticipation;
         let halves = if on { opening } else { closing };
         let valve = u32::from(if on { self.opening } else { self.closing });
-        // Between two samples, their mean.
+        // If the anticipation ends between two samples, the mean of both is used.
         let (near, far) = (valve + halves / 2, valve + halves.div_ceil(2));
         let input = Input {
             command: if on { T::ONE } else { T::ZERO },

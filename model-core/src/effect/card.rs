@@ -140,11 +140,11 @@ impl Parameter {
 /// Facts about records and model, for ranges and starting values.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Facts<'a> {
-    /// Size of y; 1 for signals of order 1, for which cards are written.
+    /// Typical size of y. The values on the cards hold for a size of 1.
     pub y: f64,
-    /// Size of u; 1 for on/off commands.
+    /// Typical size of u; 1 for on/off commands.
     pub u: f64,
-    /// Size of times; 1 for flows with time scales of 10 ms to seconds, for which cards are written.
+    /// Time scale relative to that of the cards: 1 for flows with times of 10 ms to seconds.
     pub time: f64,
     /// Root mean square change of y over a sample.
     pub y_per_sample: f64,
@@ -375,10 +375,10 @@ pub struct Spec {
     pub needs: Needs,
     /// Whether the effect is a base term, which is never reported as missing: a constant delay, the sensor's offset.
     pub base: bool,
-    /// Whether a second lag of the flow has the same output for every command: the two are then always stated
-    /// together.
+    /// Whether the effect and a second lag of the flow give the same output for every command. Reports then
+    /// always state both.
     pub lag_in_series: bool,
-    /// Whether it opposes or scales a motion: it is applied after all driving effects.
+    /// Whether the effect opposes or scales a motion; it is then applied after all driving effects.
     pub resists: bool,
     /// Whether the effect acts before all other effects of its place.
     pub leads: bool,

@@ -12,7 +12,7 @@ const DAY: f64 = 86_400.0;
 enum Date {
     /// Days since 1970-01-01.
     Days(i64),
-    /// Two ambiguous numbers of day and month, and the year.
+    /// Two numbers that can be day and month in either order, and the year.
     Either(u8, u8, i32),
 }
 

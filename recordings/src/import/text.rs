@@ -27,7 +27,7 @@ enum Layout {
     Labelled(Labels),
 }
 
-/// A line as a row.
+/// Result of reading a line as a row.
 enum Line {
     Row,
     /// Not a row; may occur between rows.

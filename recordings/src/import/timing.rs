@@ -278,7 +278,7 @@ fn scaled(t: &Variable, start: f64, scale: f64) -> PrintedTimes {
             let units = units.iter().zip(&t.values);
             units.map(|(unit, v)| unit.max(bits(v)) * scale).collect()
         }
-        // An accumulated clock has larger errors than the last bit.
+        // Times that are accumulated step by step have errors larger than the last bit.
         Exactness::Relative(share) => {
             let values = t.values.iter();
             values.map(|v| 8.0 * share * (v * scale).abs()).collect()

@@ -150,7 +150,7 @@ impl Piece {
             channel: made.channel,
             reference: T::from_f64(made.reference),
         };
-        // Any place will do: it determines only the hook that would run the program.
+        // The place has no influence here: it determines only the hook that would run the program.
         let host = UserEffect::of(program, Place::Jet, &parameters, &setting);
         let values = (0..program.ops.len()).map(|r| host.constant(r).value());
         let taps = (0..program.lines).map(|line| {

@@ -67,7 +67,8 @@ fn fill(mut lines: &[&str], scopes: &[&Holes], filled: &mut String) {
     }
 }
 
-/// The lines up to `@else`, from there to `@end`, and after it.
+/// Splits the lines after `@if` into those up to `@else`, those from there to `@end`, and those
+/// after `@end`.
 fn block<'a, 'b>(lines: &'a [&'b str]) -> (&'a [&'b str], &'a [&'b str], &'a [&'b str]) {
     let (mut depth, mut otherwise) = (0_usize, None);
     for (i, line) in lines.iter().enumerate() {

@@ -292,7 +292,8 @@ pub(crate) fn trial_rows(proof: &Proof) -> Vec<Vec<String>> {
     cases.chain([last]).collect()
 }
 
-/// Whether the table of a terminal shows this trial: the model's, the losses, and of each likelihood the largest error.
+/// Whether the table in a terminal shows this trial. It shows the trial on the model, every trial that lost attachment,
+/// and for each likelihood the trial with the largest error.
 fn is_shown(case: &Case, proof: &Proof) -> bool {
     let kind = |case: &Case| (case.group.decides(), case.group == CaseGroup::Unseen);
     let rms = case.figures.rms;

@@ -295,8 +295,8 @@ impl<L: Law> Controller<L> {
         self.last = y;
         // A non-finite reading must not enter the averages.
         let y = if y.is_finite() { y } else { 0.0 };
-        // A command may explore behaviour unknown to the model, so that the residual does not close the valve
-        // then.
+        // While a command is played, the residual does not close the valve, because a command may explore
+        // behaviour unknown to the model.
         let action = match self.mode {
             Mode::Armed => self.law.act(y, &channels),
             Mode::Playing => self.law.follow(self.demand, y, &channels),
@@ -432,7 +432,8 @@ mod tests {
         }
     }
 
-    /// The bundled rig: 4 ms of the valve, half a second of equal readings.
+    /// The bundled rig: the shortest time of its valve is 4 ms, and equal readings for half a
+    /// second mean a stuck sensor.
     #[test]
     fn the_rigs_times_are_kept_at_any_period() {
         for (period_s, hold, stuck_after) in [
@@ -504,7 +505,7 @@ mod tests {
         );
     }
 
-    /// 49 days at 1 kHz: the loop must run on past 2³² samples.
+    /// 2³² samples are 49 days at 1 kHz; the loop must continue after them.
     #[test]
     fn time_goes_on_beyond_32_bits() {
         let mut near = controller();

@@ -115,8 +115,8 @@ fn graded_commands_below_a_full_jet_leave_nothing_to_name() {
     assert!(row.is_at_floor(), "{:?}", row.over_floor);
 }
 
-/// With its lag in the model, an echo of three per cent would imitate the second order of the valve; so does
-/// another lag of the flow.
+/// If the valve's lag is in the model, an echo of three per cent would imitate the second order of the
+/// valve, and so would another lag of the flow.
 #[test]
 #[ignore = "two minutes of two cores: cargo xtask kept-rigs"]
 fn a_valve_of_second_order_is_a_valve_and_no_echo() {

@@ -112,7 +112,7 @@ impl Flow {
             }
         }
         // Above full strength the separating share would be negative, and a rate that grows with the friction
-        // would make the flow diverge: it is not applied.
+        // would make the flow diverge. The dependence on the friction is therefore not applied there.
         let separation = if j > 1.0 {
             1.0
         } else {
@@ -231,7 +231,7 @@ pub(crate) mod bench {
 
     const DT: f64 = 5e-5;
 
-    /// Attaches in 40 ms, separates in 100 ms, gain 1.
+    /// A flow that attaches in 40 ms and separates in 100 ms, with gain 1.
     pub(crate) fn flow(parts: impl IntoIterator<Item = Part>) -> Flow {
         let parts = parts.into_iter().map(|part| match part {
             Part::Flow(part) => part,

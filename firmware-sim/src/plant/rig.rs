@@ -272,7 +272,7 @@ pub(crate) mod bench {
     use super::*;
     use crate::plant::RateLaw;
 
-    /// Attaches in 40 ms, separates in 100 ms, gain 1.
+    /// A base plant that attaches in 40 ms and separates in 100 ms, with gain 1.
     pub(crate) fn base(delay: FlowDelay) -> BasePlant {
         BasePlant {
             attach_s: 0.04,

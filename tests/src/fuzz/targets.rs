@@ -443,7 +443,7 @@ fn framed(input: &[u8]) -> String {
             came.push(content.to_vec());
         }
     }
-    // Content that does not fit into a frame gives none.
+    // Content that is too long for a frame gives no frame.
     assert!(
         came.iter().all(|came| content.starts_with(came)),
         "a frame came changed"

@@ -79,7 +79,7 @@ fn lock(progress: &Mutex<Progress>) -> MutexGuard<'_, Progress> {
     progress.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// The next step that can start, or a step that cannot, with the failed one that it needs.
+/// The next step that can start; or a step that cannot run, with the failed step that it needs.
 fn next(
     steps: &[&'static Step],
     progress: &Mutex<Progress>,

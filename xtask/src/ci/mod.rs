@@ -18,7 +18,7 @@ pub(crate) const TASK: Task = Task {
 #[derive(Clone, Copy)]
 struct Step {
     name: &'static str,
-    /// Steps that must end before it starts; if one of them fails it is not run.
+    /// Steps that must end before this step starts. If one of them fails, this step is not run.
     after: &'static [&'static str],
     /// A resource that no two steps use at the same time.
     room: Option<Room>,

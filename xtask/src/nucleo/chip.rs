@@ -57,7 +57,7 @@ pub(super) struct Written {
     pub(super) value: u32,
 }
 
-/// The registers, the writes to them, and errors in these.
+/// The registers, the writes to them, and errors in these writes.
 pub(super) struct Chip {
     values: BTreeMap<u32, u32>,
     pub(super) written: Vec<Written>,

@@ -91,7 +91,7 @@ pub(super) fn archive(made: &Made) -> Result<()> {
     let parts: Value = serde_json::from_str(&read(&unpacked.join(PARTS))?)?;
     let parts = parts["components"].as_array().map_or(0, Vec::len);
     ensure!(parts > 50, "{PARTS} lists {parts} crates");
-    // Crates that are deep in the tree, and the pages' library.
+    // The licences include those of crates deep in the dependency tree, and of the pages' library.
     let notices = read(&unpacked.join(NOTICES))?;
     for part in ["faer ", "serde_core "] {
         ensure!(notices.contains(part), "{NOTICES} does not name {part}");
@@ -161,7 +161,7 @@ pub(super) fn wheel(made: &Made) -> Result<()> {
     // NumPy is the system's and is not downloaded.
     run(command(python, &["-m", "venv", "--system-site-packages"]).arg(&environment))?;
     std::fs::create_dir_all(folder.join("out/demo"))?;
-    // In place of the demo's model, which would take a minute to identify.
+    // This model replaces the demo's model, which would take a minute to identify.
     std::fs::copy(
         root().join("data/paper/table-2-state-dependent.toml"),
         folder.join("out/demo/hidden-after.toml"),

@@ -325,7 +325,7 @@ fn outliers(rng: &mut ChaCha8Rng) -> Drawn {
     rig.of(vec![Record { u, y, channel }])
 }
 
-/// A quarter of the command's gain, and a separate lag and dead time.
+/// The measured input has a quarter of the command's gain, and its own lag and dead time.
 fn measured_input(rng: &mut ChaCha8Rng) -> Drawn {
     let rig = Rig::draw(rng);
     let u = rig.switched(rng, 0.0, 3.0);

@@ -306,7 +306,7 @@ impl<L: Law> Controller<L> {
         };
         self.strayed += (action.residual - self.strayed) * Self::SHARE;
         let strayed = self.strayed.abs();
-        // Written so that NaN counts as outside: a diverged model is detected.
+        // The condition is written so that NaN counts as outside: a diverged model is detected.
         let within = strayed <= self.settings.residual_envelope;
         self.open = action.open;
         if self.is_running() && !within {
@@ -493,7 +493,7 @@ mod tests {
             let ticks = (0..900).map(|k| tick(controller, k, channel));
             ticks.map(|tick| tick.predicted).fold(0.0, f32::max)
         };
-        // 20 and 25 °C: the warm film reads less.
+        // The temperatures are 20 and 25 °C; the warm film reads less.
         let (at_20, at_25) = (run(&mut cold, 2000.0), run(&mut warm, 2500.0));
         assert!(at_20 > 0.1 && at_25 < 0.95 * at_20, "{at_20} {at_25}");
         let ill = tick(&mut cold, 0, f32::NAN);

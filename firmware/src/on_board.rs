@@ -198,7 +198,7 @@ mod tests {
             assert!(!controller.is_open());
             run(&mut controller, 100);
             assert!(!controller.is_open());
-            // The faulted law cannot be changed back to life.
+            // No change of a setting can restart the faulted law.
             assert_eq!(controller.change(target), Err(Unchanged::NotRunning));
             controller.disarm();
             assert_eq!(controller.law_settings(), designed);

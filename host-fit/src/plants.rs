@@ -317,7 +317,7 @@ mod tests {
     }
 
     fn proof_of(model: &Model, target: f64, seed: u64) -> Proof {
-        // Ten samples at any period.
+        // The shortest times are ten samples at any period.
         let shortest = 10.0 * model.sample_period_s;
         let request = TrackRequest {
             min_on_s: shortest,

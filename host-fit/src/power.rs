@@ -110,7 +110,7 @@ impl Asked {
         // Amplitudes are estimated from all records.
         let all: usize = judge.scored_records().iter().map(Record::len).sum();
         let held_out_share = (held_out.samples as f64 / all.max(1) as f64).min(1.0);
-        // An error that is at the noise level already leaves nothing to detect.
+        // If the error is at the noise level already, no effect can be detected in it.
         let from_floor = (judge.over_noise(held_out.rmse()) / TERMS.at_the_floor).powi(2);
         let taken = (1.0 - from_floor).clamp(0.0, 0.99);
         Self {

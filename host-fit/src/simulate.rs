@@ -195,7 +195,7 @@ impl<T: Real> Simulator<T> {
         if begins && first.is_none() {
             self.settle(signals, &mut state, &mut channels);
         }
-        // The samples before the record, with a constant command, run through the same loop.
+        // The samples before the record have a constant command and run through the same loop.
         let held = first.map_or(0, |_| self.samples_held());
         let (before, y) = first.unwrap_or((0.0, T::ZERO));
         let (before, y) = (std::iter::repeat_n(before, held), y - self.zero);
@@ -363,7 +363,7 @@ impl Simulator<f64> {
 fn memory(model: &Model) -> Footprint {
     match model.delay {
         Delay::Fixed { .. } => model.memory(),
-        // With room for the longer delays that a search of the law may try.
+        // The memory has room for the longer delays that a search of the law may try.
         Delay::Law(_) => model.memory_for(model.longest_delay().max(ROOM)),
     }
 }

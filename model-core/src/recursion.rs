@@ -331,7 +331,7 @@ impl<T: Real> Bilinear<'_, T> {
     #[inline(always)]
     pub(crate) fn separated(&self, jet: T, rate: T) -> T {
         let share = self.grading.share(jet);
-        // On/off jets, and rates that cannot be divided.
+        // For on/off jets, and for a rate of 0, by which nothing can be divided.
         if share == T::ZERO || share == T::ONE || rate == T::ZERO {
             return T::ONE - share;
         }
@@ -397,10 +397,10 @@ mod tests {
             let [motion, released] = self::motion(grading, 1.0);
             assert!((motion - 0.05 * (0.8 - 0.3)).abs() < 1e-12 && released == 0.0);
         }
-        // Two flows in parallel, each with its part of the jet.
+        // The model is two parallel flows, each with its part of the jet.
         let [_, released] = self::motion(Grading::Proportional, 0.4);
         assert!((released + 0.6 * 0.02 * 0.3).abs() < 1e-12);
-        // One flow with an intermediate rate, 0.6 × 0.02 + 0.4 × 0.05.
+        // The model is one flow with an intermediate rate, 0.6 × 0.02 + 0.4 × 0.05.
         let [motion, released] = self::motion(Grading::Interpolated, 0.4);
         assert!((released - motion * 0.012 / 0.032).abs() < 1e-12);
         // Either flow.

@@ -344,7 +344,7 @@ impl Folding {
                 left_over = self.waiting.len() - start - self.length;
             }
         }
-        // The first of equally frequent ones, for a unique result.
+        // Of equally frequent sequences the first is used, so that the result is unique.
         let most = self.sequences.iter().map(|s| s.periods).max().unwrap_or(0);
         let rule = self.sequences.iter().position(|s| s.periods == most);
         let Some(rule) = rule else {

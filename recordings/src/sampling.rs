@@ -171,7 +171,8 @@ impl PrintedTimes {
         let middle = sorted.len() / 2;
         let median = *sorted.select_nth_unstable_by(middle, f64::total_cmp).1;
         let rounding = |row: usize| self.unit[row - 1].max(self.unit[row]);
-        // The mean of the regular steps: the median is rounded like the printed times.
+        // The mean of the regular steps is used, because the median is rounded like the printed
+        // times.
         let regular = (1..).zip(&steps);
         let regular = regular
             .filter(|&(row, s)| (s - median).abs() <= tolerance(median, rounding(row)))
@@ -408,11 +409,13 @@ mod tests {
             let lost = times.lost_rows(stated).unwrap_or_default();
             (0..).zip(lost).filter(|(_, lost)| *lost > 0.0).collect()
         };
-        // 9.9 ms in whole milliseconds: a long gap is not counted in median steps of 10 ms.
+        // At a period of 9.9 ms printed in whole milliseconds, the median step is 10 ms; a long gap
+        // must not be counted in such steps.
         let long: Vec<usize> = (200..320).collect();
         let times = without(printed(1000, 0.0099, 3), &[&[40, 41], &long[..]].concat());
         assert_eq!(found(&times, None), [(40, 2.0), (198, 120.0)]);
-        // A clock of whole seconds: a single missing second is a lost row, several are rounding.
+        // For a clock of whole seconds, a single missing second is a lost row; several missing
+        // seconds are due to rounding.
         let times = without(whole(600, 1.0, 1.0, 0.0), &[300]);
         assert_eq!(found(&times, None), [(300, 1.0)]);
         assert_eq!(found(&whole(600, 1.01, 1.0, 0.0), None), []);

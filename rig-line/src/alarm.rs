@@ -297,7 +297,7 @@ mod tests {
             "{:?}",
             alarm.verdict()
         );
-        // A change by a twentieth of the range, invisible in a single sample.
+        // The mean changes by a twentieth of the range, which is invisible in a single sample.
         for _ in 0..5_000 {
             alarm.push(0.05 + film.sample());
         }

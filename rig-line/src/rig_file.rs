@@ -242,7 +242,7 @@ impl RigFile {
     #[must_use]
     pub fn hold_samples(&self) -> [u32; 2] {
         [self.valve.shortest_on_s, self.valve.shortest_off_s]
-            // A thousandth of a sample is rounding in the file.
+            // A difference below a thousandth of a sample is rounding in the file.
             .map(|time| (time / self.sample_period_s - 1e-3).ceil().max(1.0) as u32)
     }
 

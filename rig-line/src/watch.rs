@@ -308,7 +308,8 @@ impl Watcher {
         }
         self.phase = streamed.phase;
         let runs = streamed.phase == Phase::Armed;
-        // Another target is another operating point, with a transient and its own model error.
+        // With another target the operating point changes: there is a transient, and the model
+        // error is different.
         if runs && streamed.reference != self.reference {
             if self.reference.is_some() {
                 self.alarm.learn_again();

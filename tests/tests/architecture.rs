@@ -32,8 +32,8 @@ const CRATES: [(&str, &[&str]); 8] = [
     ("firmware-sim", &["closed-loop", "recordings"]),
     (
         "host-fit",
-        // Simulator, line and workbench serve the program only: they are optional dependencies, see the CI step
-        // "library alone".
+        // Simulator, line and workbench are used by the program only, so they are optional dependencies; see
+        // the CI step "library alone".
         &[
             "closed-loop",
             "firmware-sim",

@@ -24,7 +24,8 @@ fn asked_of_all(case: &Case) -> Row {
 }
 
 fn asked_of(case: &Case, part: Option<Part>) -> Row {
-    // A limit for a search that never ends; other steps of CI may run at the same time.
+    // The time limit stops a search that never ends; it is long, because other steps of CI may run
+    // at the same time.
     let program = Program {
         part,
         ..Program::new(scenarios::program(), Duration::from_secs(900))
@@ -78,7 +79,7 @@ fn the_default_model_comes_near_the_noise_in_mid_run_and_under_other_laws() {
         ..Case::new(Group::Nothing, Family::Wake, &[], 2_026_200_179)
     };
     let saturating = Case::new(Group::Nothing, Family::RateOfY, &[], 3_131_200_114);
-    // At 1.06 × the noise level something is unexplained, and it gets no name.
+    // At 1.06 × the noise level part of the error is unexplained, and no effect is named.
     for (case, verdict) in [(in_mid_run, "unexplained"), (saturating, "nothing-missing")] {
         let row = asked_of_all(&case);
         assert_eq!(row.verdict, verdict, "{case}");

@@ -233,7 +233,8 @@ mod tests {
             (0..length)
                 .map(|_| {
                     seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-                    // Many zeros and, in long frames, long sequences without a zero.
+                    // The content has many zeros and, in long frames, long sequences without a
+                    // zero.
                     let byte = (seed >> 24) as u8;
                     if length % 3 == 0 {
                         byte | 1

@@ -110,7 +110,7 @@ impl Batch {
                 self.frame.put(&reference.to_bits().to_le_bytes());
             }
         }
-        // Two times 12 bits in three bytes.
+        // Two 12-bit numbers are stored in three bytes.
         let (counts, channel) = (sample.counts.min(FULL), sample.channel.min(FULL));
         let [c0, c1] = counts.to_le_bytes();
         let [d0, d1] = channel.to_le_bytes();

@@ -14,7 +14,8 @@ impl RigPlan {
     pub fn also_true(&self) -> Vec<Truth> {
         let delay = match self.plant.delay() {
             FlowDelay::Fixed { .. } => None,
-            // A delay law depends on a mean of the friction, which other means of the past resemble.
+            // A delay law depends on one mean of the friction, and other means of the past are
+            // similar to it.
             FlowDelay::StateDependent { .. } | FlowDelay::Clamped { .. } => Some(Truth::new(
                 Port::Delay,
                 &["mean y", "memory of y", "past y", "y"],

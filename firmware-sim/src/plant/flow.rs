@@ -84,7 +84,7 @@ impl Flow {
         let (own_dot, memories_dot) = rest.split_at_mut(own.len());
         let extra = (self.parts.iter().zip(memories)).fold(0.0, |sum, (p, z)| sum + p.drive(s, *z));
 
-        // The level without and with the jet, and the quantity that follows it.
+        // Level without and with the jet, and the state that follows this level.
         let (mut off, mut on, mut follower) = (0.0, self.gain, s);
         match &self.character {
             Character::FirstOrder
@@ -325,7 +325,7 @@ mod tests {
         let t = 0.05_f64;
         let response = |a: f64, b: f64| 1.0 - (a * (-t / a).exp() - b * (-t / b).exp()) / (a - b);
         assert!((hold(&mut flow, 1.0, t) - response(0.04, 0.01)).abs() < 1e-9);
-        // time·s² + s + rate: the poles of the flow with inertia.
+        // The poles of the flow with inertia are the roots of time·s² + s + rate.
         let time_s = 0.008;
         let mut flow = flow_of(Character::Inertia { time_s });
         let root = (1.0_f64 - 4.0 * time_s / 0.04).sqrt();

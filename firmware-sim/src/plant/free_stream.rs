@@ -36,7 +36,8 @@ impl FreeStream {
                 rng.random_range(0.0..std::f64::consts::TAU),
             );
         }
-        // A separate random stream, so that rigs without a temperature are unchanged.
+        // The temperature has a separate random stream, so that rigs without a temperature are
+        // unchanged.
         let mut own = ChaCha8Rng::seed_from_u64(waves[0].2.to_bits());
         let warmth = [(2.5, 0.12, 0.30), (1.5, 0.35, 0.80)].map(|(size, low, high)| {
             (

@@ -335,7 +335,7 @@ mod tests {
             },
             &[],
         );
-        // From rest the mean is 0: the delay of the first edge is floor + rise.
+        // The mean friction at rest is 0, so the delay of the first edge is floor + rise.
         rig.command(1.0);
         for _ in 0..42 {
             rig.advance_sample();
@@ -348,7 +348,8 @@ mod tests {
         rig.advance_sample();
         let expected = 1.0 - (-0.001_f64 / 0.04).exp();
         assert!((rig.friction() - expected).abs() < 1e-3 * expected + 2e-4);
-        // After long blowing the mean is 1: the delay of the falling edge is floor + rise·exp(−rate).
+        // After long blowing the mean friction is 1, so the delay of the falling edge is floor +
+        // rise·exp(−rate).
         for _ in 0..2000 {
             rig.advance_sample();
         }
@@ -402,7 +403,8 @@ mod tests {
 
     #[test]
     fn effects_add_up_in_the_physical_order() {
-        // A lagging valve, a drooping plenum and King's law together, under steady blowing.
+        // The rig has a lagging valve, a drooping plenum and King's law together, under steady
+        // blowing.
         let (ratio, offset) = (1.5, 0.05);
         let effects = [
             HotFilmNonlinearity {

@@ -136,7 +136,7 @@ impl<C: Cases> Server<C> {
                     [low, high] => u16::from_le_bytes([*low, *high]),
                     _ => 0,
                 });
-                // Constant over the batch, because channels are slow.
+                // The channel counts as constant over the batch, because channels are slow.
                 let channel = counts.next().unwrap_or(0);
                 for (i, counts) in counts.take(BATCH).enumerate() {
                     let (predicted, open) = self.cases.step(counts, channel);

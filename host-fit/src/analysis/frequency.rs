@@ -76,10 +76,11 @@ pub fn frequency_response(model: &Model, command: u8, longest_s: f64) -> Option<
     let dead_time = impulse.iter().position(|g| g.abs() > 1e-9 * most)?;
     let period = model.sample_period_s;
     let wanted = (longest_s / period).min(LONGEST as f64 / 4.0) as usize;
-    // Four times as long as the response: the phase then turns by less than 90° from line to line.
+    // The transform is four times as long as the response, so that the phase turns by less than 90°
+    // from line to line.
     let length = 4 * impulse.len().max(wanted);
     let length = length.next_power_of_two();
-    // Without its dead time, which is added to the phase afterwards.
+    // The response is transformed without its dead time, which is added to the phase afterwards.
     let mut input = impulse.get(dead_time..)?.to_vec();
     input.resize(length, 0.0);
     let transform = RealFftPlanner::new().plan_fft_forward(length);

@@ -57,7 +57,7 @@ impl InitialState {
         };
         for mut column in free {
             let size = new.over_the_beginning(&column, &column).sqrt();
-            // Gram–Schmidt, twice for nearly parallel columns.
+            // Gram–Schmidt is applied twice, because columns may be nearly parallel.
             for _ in 0..2 {
                 new.remove_from(&mut column);
             }

@@ -70,7 +70,7 @@ impl Tried {
         let verdict = self.verdict();
         let mut lines = verdict.lines();
         let evidence = lines.next().unwrap_or_default();
-        // For a tracking law: its errors on the model without noise.
+        // For a tracking law, the evidence is its errors on the model without noise.
         let tracks = matches!(self.design.outcome, DesignOutcome::Track(_));
         let model = self.proof.cases.first().filter(|_| tracks);
         let settles = model.is_none_or(|case| case.figures.settling_s.is_some());

@@ -310,7 +310,7 @@ mod tests {
                 *count += u32::from(p.unwrap() < 0.05);
             }
         }
-        // 15 expected of 300; 5–28 is ± 3.3 standard deviations.
+        // Of 300, 15 are expected; 5–28 is ± 3.3 standard deviations.
         assert!(
             alarms.iter().all(|a| (5..=28).contains(a)),
             "{alarms:?} of {runs}"

@@ -267,7 +267,8 @@ fn a_rig_sampled_at_ten_milliseconds_is_measured_at_nearly_every_edge() {
                 u.extend(std::iter::repeat_n(level, rng.random_range(8..18)));
             }
             u.truncate(1200);
-            // h = 3 + 2·exp(−4·y) samples, different rates, and a gain that decreases during blowing.
+            // The plant has h = 3 + 2·exp(−4·y) samples, different rates of attachment and
+            // separation, and a gain that decreases during blowing.
             let steps = 20;
             let (mut value, mut store): (f64, f64) = (0.0, 1.0);
             let y = (0..u.len())

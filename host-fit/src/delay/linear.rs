@@ -144,7 +144,7 @@ impl Series {
         for mut column in std::iter::once(vec![1.0; n]).chain(plant.free(&self.switching, n)) {
             self.counted(&mut column);
             let before = dot(&column, &column);
-            // Repeated once to remove rounding errors.
+            // The projection is repeated once to remove rounding errors.
             for _ in 0..2 {
                 remove(&basis, &mut column);
             }
@@ -442,7 +442,8 @@ pub(crate) fn refine(
     let mut information = Vec::new();
     for step in 0..STEPS {
         let plant = at.plant;
-        // Steps of the difference quotients; backward differences near a bound.
+        // These are the steps of the difference quotients. Near a bound, backward differences are
+        // used.
         let delta_h = 1e-3 * plant.mean_sum().clamp(1.0, 100.0);
         let deltas = [
             if plant.mean_delay() + delta_h > max_delay {

@@ -86,7 +86,7 @@ impl<'a> Neighbourhood<'a> {
         index: usize,
         expected: &'a Expectation,
     ) -> Result<Self, Unmeasured> {
-        // Margin for neighbouring responses that are late or early.
+        // This is a margin for neighbouring responses that are late or early.
         let room = (expected.reach / 4).max(2);
         let start = |e: &Edge| e.sample + expected.of(*e).onset;
         Ok(Self {

@@ -94,7 +94,7 @@ impl Dynamics {
             (decay, decay * time)
         } else if spread > 0.0 {
             let root = spread.sqrt();
-            // The slow pole, computed without a difference of nearly equal numbers.
+            // The slow pole is computed without a difference of nearly equal numbers.
             let slow = (-2.0 * time / (s * (1.0 + root))).exp();
             let fast = (-0.5 * time * (1.0 + root) / bs).exp();
             ((slow + fast) / 2.0, (slow - fast) * bs / root)
@@ -338,7 +338,7 @@ mod tests {
 
     #[test]
     fn a_plant_that_rings_rings() {
-        // Damping ratio ½: the overshoot is exp(−π/√3) = 16.3 %.
+        // At a damping ratio of ½ the overshoot is exp(−π/√3) = 16.3 %.
         let out = response(Plant::linear(0.0, 20.0, 1.0), &[1.0; 400]);
         let highest = out.iter().copied().fold(0.0, f64::max);
         assert!((highest - 1.163).abs() < 0.002, "{highest}");

@@ -1,4 +1,5 @@
-//! Fit to all edges of all records: time scales, command before each record, one plant, one dead time.
+//! One plant with one dead time, fitted to all edges of all records, with the time scales and the
+//! command before each record.
 
 use super::dead_time::{DeadTime, correlation_of_neighbours, dead_time, widened_variance};
 use super::linear::{Free, Refined, Series, coarse, evaluate, fit, refine};

@@ -549,7 +549,7 @@ mod tests {
                 value += (arrived - value) / tau / f64::from(steps);
             }
             y.push(value);
-            // ỹ of the next sample: y_{k−248} … y_k, 249 terms.
+            // ỹ of the next sample is the mean over the 249 terms y_{k−248} … y_k.
             sum += y[k];
             if k >= 249 {
                 sum -= y[k - 249];

@@ -108,7 +108,7 @@ pub fn margin(model: &Model, law: &Track, noise: f64, seed: u64, planes: bool) -
         most: RULES.margin_rms * rms,
         ..search
     };
-    // Along the axes, downwards and upwards.
+    // The first six rays go along the axes, downwards and upwards.
     let axes: Vec<End> = parallel::each(0..6, |way| {
         let mut direction = [0.0; 3];
         direction[way / 2] = if way % 2 == 0 { -1.0 } else { 1.0 };

@@ -226,7 +226,7 @@ pub fn maximise(model: &Model, request: &MaximiseRequest) -> Result<Optimum, Des
     candidates.push(search.judge(&steady));
     let best_first = |list: &mut Vec<JudgedTrain>| order::descending(list, |one| one.value);
     best_first(&mut candidates);
-    // The best few are refined; they are rarely neighbours.
+    // The best distinct trains are refined.
     let starts: Vec<JudgedTrain> = distinct(&candidates, RULES.refined);
     let mut refined = parallel::each(starts, |start| {
         search.refine(start, request.pulses.clamp(1, 4))
@@ -478,7 +478,7 @@ impl TrainSearch {
                     });
                 }
             }
-            // A longer period at the same duty.
+            // Tries a longer or shorter period at the same duty.
             add(&|t| {
                 t.period = shifted(t.period, up)?;
                 t.pulses[0].1 = shifted(t.pulses[0].1, up)?;
@@ -602,7 +602,8 @@ mod tests {
         let (pulses, steady) = (weighed.pulses.unwrap(), weighed.steady_value.unwrap());
         assert_eq!(weighed.value, pulses.value.max(steady));
         assert!((pulses.value - (pulses.mean - 0.4 * pulses.duty)).abs() < 1e-9);
-        // Pulses are the optimum exactly if the price of air is above the one from which they are better.
+        // Pulses are the optimum exactly if the price of air is above the lowest price at which they are
+        // better.
         let pays_from = weighed.pulses_pay_from.unwrap();
         assert_eq!(pulses.value > steady, 0.4 > pays_from, "{weighed:?}");
         assert!(optimum.mean_detuned > 0.95 * optimum.mean, "{optimum:?}");

@@ -185,7 +185,7 @@ fn intervals(judge: &RecordJudge) -> Vec<PossibleFlow> {
             continue;
         }
         for side in [-1.0, 1.0] {
-            // Shortened below 1.96 standard errors if the linear approximation fails.
+            // The step is shortened below 1.96 standard errors if the linear approximation fails.
             let ends = (0..RULES.interval_steps).map(|step| 0.8_f64.powf(f64::from(step)));
             let flow = ends.into_iter().find_map(|share| {
                 let mut moved = values.clone();
@@ -341,7 +341,7 @@ fn largest_size(
     let at = |size: f64, start: &Option<Model>| {
         let parameters = between(spec, mild, worst, size);
         let fresh = with_effect(judge, spec, &parameters);
-        // Starts from the refit at a smaller size.
+        // The refit starts from the refit at a smaller size.
         let model = match start {
             Some(model) => Model {
                 effects: fresh.effects,

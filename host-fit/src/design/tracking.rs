@@ -539,7 +539,8 @@ pub(super) mod tests {
         let design = track(&model, &request).unwrap();
         let figures = on_model(&Player::of(&model), design.law.tracking());
         let decay = (-shortest / tau).exp();
-        // Mean square of (1 − high·e^{−t/τ}) − 1/2 over a part, high = 1/(1 + decay).
+        // Mean square of (1 − high·e^{−t/τ}) − 1/2 over one part of the cycle, with high = 1/(1 +
+        // decay).
         let high = 1.0 / (1.0 + decay);
         let mean_square = 0.25 - high * tau / shortest * (1.0 - decay)
             + high.powi(2) * tau / (2.0 * shortest) * (1.0 - decay.powi(2));

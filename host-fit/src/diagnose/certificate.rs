@@ -231,7 +231,7 @@ impl Session<'_> {
         let own = self.evidence_of(model);
         let certificates = effects.into_iter().filter_map(|(term, places)| {
             let name = term.effect()?.name;
-            // Without the evidence of a null model nothing is certified.
+            // If the evidence of a null model is unknown, nothing is certified.
             let evident = |at: &usize| Some((*at, nulls[*at]?));
             let own_nulls: Option<Vec<(usize, Null)>> = places.iter().map(evident).collect();
             let own_nulls = own_nulls?;

@@ -104,7 +104,8 @@ fn points(mut weighted: Vec<(f64, f64)>) -> Option<(Vec<f64>, usize)> {
             x.push(place);
         }
     }
-    // A rest that is constant throughout a record covers several quantiles; the values between them get points too.
+    // A rest that is constant throughout a record covers several quantiles. The values between such rests get
+    // points too.
     let from = |x: f64| weighted.partition_point(|(own, _)| *own <= x);
     let to = |x: f64| weighted.partition_point(|(own, _)| *own < x);
     let before = |index: usize| index.checked_sub(1).map_or(0.0, |last| up_to[last]);

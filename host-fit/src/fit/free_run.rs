@@ -340,7 +340,8 @@ impl LeastSquares for FreeRunProblem<'_> {
         let each = |record: usize| {
             let (measured, lead) = (self.measured[record], self.lead[record]);
             let (mut sum, mut product, mut square) = (0.0, 0.0, 0.0);
-            // The component of the error along y is known only at the end of the record.
+            // With level scatter the run cannot be stopped early, because the component of the
+            // error along y is known only at the end of the record.
             let enough = match self.level_scatter {
                 Some(_) => f64::MAX,
                 None => enough,

@@ -74,7 +74,7 @@ fn descend(
                 .map(|lag| with_lag(evaluator.problem(), &delays, slot, *lag))
                 .collect();
             let found = best_of(evaluator, &trials, &mut best)?;
-            // Continue from the best lag of the slot, whether new or not.
+            // The search continues from the best lag of the slot, whether it is new or not.
             let mut lag = match found {
                 Some(at) => minima[at],
                 None => lag_in(&delays, slot),

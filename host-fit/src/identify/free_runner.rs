@@ -294,7 +294,7 @@ impl pulp::NullaryFnOnce for BlockRun<'_> {
             ..
         } = self.runner;
         let inputs = self.arrivals.len();
-        // Zeros before a record, for the longest lag and the average.
+        // Zeros precede a record, for the longest lag and the average.
         let padding = usize::from(structure.longest_lag).max(AVERAGED);
         let mut sum = 0.0;
         let mut done = 0;

@@ -116,7 +116,7 @@ impl Regression {
         let layout = Layout::new(structure);
         let signals = FitSignals::new(records, structure);
         let longest = structure.convention.behind_newest(structure.longest_lag);
-        // At most half of the memory, but at least what one candidate needs.
+        // The tables may use half of the memory limit, or what one candidate needs if that is more.
         let fitting =
             usize::try_from(memory::limit() / 2 / table_bytes(longest)).unwrap_or(TABLES_KEPT);
         let most = fitting.clamp(
@@ -156,7 +156,7 @@ impl Regression {
         match (l, m) {
             (0, 0) => Which::Plain,
             (0, l) | (l, 0) => Which::Single(tick(l)),
-            // On or off: d² = d.
+            // For an on/off command d² = d.
             (l, m) if self.binary && tick(l) == tick(m) => Which::Single(tick(l)),
             (l, m) => Which::Product(tick(l).min(tick(m)), tick(l).max(tick(m))),
         }
@@ -383,7 +383,8 @@ impl Regression {
         let mut residuals = Vec::with_capacity(ticks.len());
         for &tick in ticks {
             let mut moved = delays.clone();
-            // Kept unsorted here: the columns of the inputs are in order of `delays`.
+            // The ticks are not sorted here, because the columns of the inputs are in the order of
+            // `delays`.
             moved.ticks[input] = tick;
             let columns = self.layout.columns(&moved);
             let weights: Vec<Weights> = (0..=moved.ticks.len())

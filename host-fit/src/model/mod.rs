@@ -323,7 +323,7 @@ impl Model {
     #[must_use]
     pub fn longest_delay(&self) -> usize {
         let longest = self.delay.longest(self.sample_period_s);
-        // Longer ones in files are rejected; during a search they may exceed the limit.
+        // Longer delays in files are rejected, but during a search a delay may exceed the limit.
         longest.clamp(0.0, bounds::LONGEST.into()).round() as usize
     }
 

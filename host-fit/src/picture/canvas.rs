@@ -362,7 +362,8 @@ pub(super) fn text_width(text: &str, size: f64) -> f64 {
 
 /// `text`, shortened with an ellipsis if it is wider than `width` pixels.
 pub(super) fn fit(text: &str, size: f64, width: f64) -> String {
-    // Half a pixel of tolerance: callers compute `width` from the same text and round it.
+    // Half a pixel of tolerance is needed, because callers compute `width` from the same text and
+    // round it.
     if text_width(text, size) <= width + 0.5 {
         return text.to_owned();
     }

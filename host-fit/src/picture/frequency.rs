@@ -80,7 +80,7 @@ pub fn frequency(plot: &FrequencyPlot<'_>) -> Picture {
         let Some(gain) = range(&gains, &measured_gains, DEPTH) else {
             return nothing(canvas, plot.title, "There is nothing to draw.");
         };
-        // A phase is drawn where its magnitude is.
+        // A phase is drawn only where its magnitude is drawn.
         let phase = |[_, magnitude, phase]: &[f64; 3]| match decibels(*magnitude) >= gain.0 {
             true => *phase,
             false => f64::NAN,
@@ -235,7 +235,7 @@ mod tests {
         ] {
             assert!(said.contains(word), "{word} in {said}");
         }
-        // The phase of the last point is 3600° below: the axis ends before.
+        // The phase of the last point is 3600° lower, so the axis ends before it.
         assert!(!said.contains("−3600"), "{said}");
     }
 

@@ -255,7 +255,7 @@ impl Report {
     /// A line at the foot of the page: tool version, data hash, seed, command.
     pub fn provenance(&mut self, name: &str, value: &str) -> &mut Self {
         let line = (name.to_owned(), value.to_owned());
-        // Parts of one page often share them.
+        // Several parts of a page often have the same line.
         if !self.provenance.contains(&line) {
             self.provenance.push(line);
         }

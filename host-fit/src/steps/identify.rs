@@ -300,7 +300,7 @@ fn overfitted(scores: &Scores, model: &Model) -> Option<String> {
         finite_fit(scores.identify.as_ref())?,
         finite_fit(scores.validate.as_ref())?,
     );
-    // Only advice that the model does not follow already.
+    // The remark gives only advice that the model does not follow already.
     let fewer = match (model.state_lags.len(), model.product_lags.len()) {
         (0..=1, 0..=1) => "",
         (0..=2, 0..=2) => "fewer lags (`--n1 1 --n2 1`), ",

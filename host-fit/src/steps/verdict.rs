@@ -272,7 +272,7 @@ fn imitated(diagnosis: &Diagnosis) -> Option<&Rung> {
 fn behaviour(diagnosis: &Diagnosis) -> String {
     let each = diagnosis.missing.iter().map(|name| {
         let text = shown(name, diagnosis.parameters.get(name));
-        // For a user's own effect, its summary.
+        // For a user's own effect, its summary is used.
         let summary = || diagnosis.model.spec(name).map(|spec| spec.summary);
         text.or_else(|| summary().map(str::to_owned))
             .unwrap_or_else(|| format!("the behaviour of `{name}`"))

@@ -67,7 +67,7 @@ impl HeldOut {
 /// differ. A paired test on the blocks' gains would lose power if the gain is concentrated in few blocks.
 pub(crate) fn p_value(worse: &HeldOut, better: &HeldOut) -> f64 {
     let block = better.block;
-    // Per block: Σ m·d and Σ d·d.
+    // Each block gives Σ m·d and Σ d·d.
     let mut blocks = Vec::new();
     for (worse, better) in worse.errors.iter().zip(&better.errors) {
         let (worse, better) = last_of_both(worse, better);
@@ -138,7 +138,7 @@ mod tests {
             let (a, b) = (held_out(&mut rng), held_out(&mut rng));
             alarms += usize::from(p_value(&a, &b) < 0.05);
         }
-        // Binomial(400, 0.05): 20 ± 4.4.
+        // Of 400, 20 ± 4.4 are expected.
         assert!((7..=35).contains(&alarms), "{alarms} of {trials}");
     }
 
@@ -167,7 +167,7 @@ mod tests {
             alarms += usize::from(p_value(&off_by(0.5), &off_by(-0.5)) < 0.05);
             found += usize::from(p_value(&off_by(1.0), &off_by(0.0)) < 0.01);
         }
-        // Six clusters: the level of the test is not exact.
+        // With six clusters the level of the test is not exact.
         assert!((5..=45).contains(&alarms), "{alarms} of {trials}");
         assert!(found > 320, "{found} of {trials}");
     }

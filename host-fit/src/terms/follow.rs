@@ -344,7 +344,7 @@ mod tests {
             (&[1][..], &[1][..])
         );
         assert_eq!(model.effects.len(), 1);
-        // Models that have only lags, or only an effect, keep all terms.
+        // Models with only lags, or with only an effect, keep all terms.
         assert!(search.without_lags(&anew, &root).is_none());
         assert!(search.without_lags(&root, &root).is_none());
     }

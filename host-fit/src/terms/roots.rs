@@ -36,7 +36,8 @@ impl Search<'_> {
                 model.start = Start::Measured;
             }
         }
-        // A base that was fitted without the kept effects may diverge with them; the given one was fitted with them.
+        // A base that was fitted without the kept effects may diverge with them. The given model was fitted with
+        // them and is then refitted instead.
         let refitted = self.judge.refitted(&model);
         let mut judged = refitted.or_else(|error| self.judge.refitted(&own).map_err(|_| error))?;
         if !self.judge.on_off {

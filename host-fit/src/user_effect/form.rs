@@ -42,7 +42,7 @@ pub(crate) struct Form {
 pub(crate) fn form(name: &str) -> Option<&'static Form> {
     static FORMS: OnceLock<Vec<Form>> = OnceLock::new();
     let forms = FORMS.get_or_init(|| {
-        // A test compiles all forms; one that does not compile counts as missing.
+        // A test checks that all forms compile; a form that does not compile counts as missing.
         let written: BTreeMap<String, Written> =
             toml::from_str(include_str!("forms.toml")).unwrap_or_default();
         let specs = SPECS.iter().chain(NUISANCES).chain(LAWS);

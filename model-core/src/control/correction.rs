@@ -67,7 +67,8 @@ impl<T: Real, const A: usize> Correction<T, A> {
         let flow = estimate + residual;
         let missed = flow - self.predictions.back(usize::from(law.lead));
         if reference != self.reference {
-            // The model error differs at another level of y, so integration has its full rate again.
+            // The model error differs at another level of y, so the integral starts again with its
+            // full rate.
             self.reference = reference;
             self.share = T::ONE;
         }
@@ -91,7 +92,8 @@ impl<T: Real, const A: usize> Correction<T, A> {
         if !(still && pushes_on == on) {
             let integral = self.integral + integral_rate * error;
             self.integral = limited(integral, law.correction_limit);
-            // The Riccati equation of an offset that drifts: dg/dt = settled gain squared − g².
+            // The gain g of a drifting offset follows a Riccati equation: dg/dt = (settled gain)² −
+            // g².
             let falls = self.share * self.share - law.settled * law.settled;
             self.share = self.share - law.integral_rate * falls;
         }
@@ -155,8 +157,8 @@ mod tests {
     fn the_integral_grows_to_its_limit_and_waits_for_a_valve_that_can_give_no_more() {
         assert!((after(13, 0, false).integral + 0.01).abs() < 1e-12);
         assert_eq!(after(1000, 0, false).integral, -0.3);
-        // Too much flow after a long time with the valve closed: the integral stops. With the valve open it does
-        // not.
+        // The friction is above the reference. After a long time with the valve closed the integral stops; with
+        // the valve open it does not.
         assert_eq!(after(1000, 12, false).integral, 0.0);
         assert_eq!(after(1000, 12, true).integral, -0.3);
     }
@@ -181,7 +183,7 @@ mod tests {
         };
         let quiet = learnt(&law, 3000, 0.0);
         assert_eq!(quiet.bias, 0.0);
-        // The rate decreases to the final rate of the Riccati equation and not further.
+        // The rate falls to the final rate of the Riccati equation and no lower.
         assert!((quiet.share - 0.2).abs() < 0.005, "{}", quiet.share);
         // A changed model error moves the bias beyond its dead band, and resets the integral rate.
         let mut wrong = quiet;

@@ -178,7 +178,7 @@ impl<T: Real> Tracking<T> {
         let looks = !state
             .foreknown
             .begin(&model.recursion(), &state.model.outputs);
-        // The position to evaluate: the other one, if the valve may switch.
+        // If the valve may switch, the other position is evaluated, otherwise the present one.
         let look = if looks {
             self.look_ahead(model, state, was_on != may_switch, channels)
         } else {

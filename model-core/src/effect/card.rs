@@ -198,7 +198,8 @@ impl StartValue {
             _ => samples,
         };
         match self {
-            // A typical change of y is a better scale for it than the size of y.
+            // For a parameter in y per sample, a typical change of y is a better scale than the
+            // size of y.
             Self::Number(value) if parameter.unit == Unit::YPerSample => value * facts.y_per_sample,
             Self::Number(value) => value * parameter.unit.scale(facts.y, facts.time, facts.u),
             Self::Quantile(q) => facts.quantile(q),
@@ -446,7 +447,7 @@ mod tests {
         assert_eq!(value(StartValue::Quantile(0.5), Unit::Y), 10.0);
         assert_eq!(value(StartValue::Delay(-6.0), Unit::Samples), 34.0);
         assert_eq!(value(StartValue::Delay(-6.0), Unit::Second), 0.068);
-        // Limited to one sample from below, and to the range from above.
+        // A starting value is at least one sample and at most the upper end of the range.
         assert_eq!(value(StartValue::Delay(-60.0), Unit::Second), 0.002);
         assert_eq!(value(StartValue::Delay(1e6), Unit::Second), 1.0);
         assert!((value(StartValue::TimeConstants(2.0), Unit::Samples) - 100.0).abs() < 1e-9);

@@ -185,7 +185,7 @@ fn date_of(text: &str) -> Option<Date> {
         return days(year(a)?, number(b, 2)?, number(c, 2)?);
     }
     let (first, second, year) = (number(a, 2)?, number(b, 2)?, year(c)?);
-    // With points the day is first.
+    // In a date with points the day is first.
     if text.contains('.') {
         return days(year, second, first);
     }

@@ -130,7 +130,7 @@ impl Mapping {
         let clock = times.clock(stated).map_err(|f| {
             let row = rows.get(f.row).copied().unwrap_or(f.row);
             let problem = match f.problem {
-                // A gap that was not filled and is not a multiple of the period.
+                // The gap was not filled, and its length is not a multiple of the period.
                 DataProblem::TimeGap { step, period, .. } if self.fill_gaps_s.is_some() => {
                     DataProblem::TimeUneven { step, period }
                 }
@@ -208,7 +208,7 @@ impl Mapping {
         if let Some(scale) = seconds_by_name(&time.name) {
             return Ok(known(scale));
         }
-        // From September 2001 to November 2286.
+        // The ranges correspond to times from September 2001 to November 2286.
         let first = time.values.first().copied().unwrap_or(0.0) / SINCE_1970;
         let epochs = [("s", 1.0), ("ms", 1e-3), ("µs", 1e-6), ("ns", 1e-9)];
         let is_one = |(_, seconds): &(&str, f64)| (1.0..10.0).contains(&(first * seconds));

@@ -173,7 +173,8 @@ fn rig(
     let before = ask(&base.parts, &folders[0]);
     let mut found = Vec::new();
     for change in Change::ALL {
-        // Drawn for every change, so that each is the same with and without the others.
+        // The random numbers are drawn for every change, so that a change is the same with and
+        // without the others.
         let (changed, factor, words) = change.applied(&base, &mut random);
         if !options.tries(change) {
             continue;

@@ -126,7 +126,8 @@ fn a_term_that_no_catalogue_has_is_found_and_taken_as_a_formula() {
 fn the_experiment_that_tells_is_drawn_and_saved() {
     let folder = tempfile::tempdir().expect("a folder");
     let data = folder.path().join("saturation");
-    // A pull that grows with the cube of y, or with its duration: slow square waves do not distinguish the two.
+    // A pull that grows with the cube of y is not distinguishable from a pull that grows with its duration if
+    // all square waves are slow.
     let records: &[Asked] = &[
         ("a", "identify", |_| 250),
         ("b", "identify", |_| 150),

@@ -42,7 +42,7 @@ pub(super) fn run(steps: &[&'static Step]) -> Result<Vec<Done>> {
     std::fs::create_dir_all(&folder)?;
     // A step may rebuild this program.
     let program = folder.join("xtask");
-    // A copy of a stopped run may still be running.
+    // The copy of a stopped run may still be running, so it is removed before the new copy.
     let _ = std::fs::remove_file(&program);
     std::fs::copy(std::env::current_exe()?, &program).context("could not copy this program")?;
     let (progress, changed) = (Mutex::new(Progress::default()), Condvar::new());

@@ -158,7 +158,7 @@ pub(super) fn wheel(made: &Made) -> Result<()> {
     let folder = &elsewhere.0;
     let environment = folder.join("venv");
     let python = crate::setup::python()?;
-    // NumPy is the system's and is not downloaded.
+    // NumPy of the system is used and not downloaded.
     run(command(python, &["-m", "venv", "--system-site-packages"]).arg(&environment))?;
     std::fs::create_dir_all(folder.join("out/demo"))?;
     // This model replaces the demo's model, which would take a minute to identify.

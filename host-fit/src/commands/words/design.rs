@@ -266,7 +266,7 @@ pub(crate) fn trial_rows(proof: &Proof) -> Vec<Vec<String>> {
     let row = |name: &str, likely: String, kept: &str, f: &Figures, steady: String| {
         let mut cells = vec![name.to_owned(), likely, kept.to_owned()];
         cells.extend([f.mean, f.rms].map(|v| format!("{v:.3}")));
-        // Without the sign of a rounded −0.
+        // Adding 0 removes the sign of a rounded −0.
         cells.push(format!("{:+.3}", (1e3 * f.offset).round() / 1e3 + 0.0));
         cells.push(format!("{:.3}", f.peak_to_peak));
         cells.push(format!("{:.1}", f.switches_per_s));

@@ -2,11 +2,11 @@
 //! 80 % of cases.
 //!
 //! The amplitude is limited by what the base model can imitate. The part of the effect's change of the free run
-//! that the model's own parameters can follow is subtracted. So are further lags and unnamed terms, as long as each
-//! lowers the error by more than its parameters cost. The remaining part must exceed the practical margin and be
-//! significant over all candidates. A gain x²·‖z‖² has the standard deviation 2x·S, with S² = Σ (z·e)² over blocks
-//! longer than the correlation time of the error e. The threshold must be exceeded by 0.84 of this standard
-//! deviation.
+//! that the model's own parameters can follow is subtracted. Further lags and unnamed terms are subtracted too, as
+//! long as each lowers the error by more than the penalty of its parameters. The remaining part must exceed the
+//! practical margin and be significant over all candidates. A gain x²·‖z‖² has the standard deviation 2x·S, with S²
+//! = Σ (z·e)² over blocks longer than the correlation time of the error e. The threshold must be exceeded by 0.84
+//! of this standard deviation.
 
 use crate::data::Record;
 use crate::diagnose::RULES as NAMED;

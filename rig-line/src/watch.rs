@@ -134,8 +134,8 @@ const SETTLING: u64 = 1000;
 /// Weight of a residual in the average that the board compares with its limit.
 const SHARE: f64 = 1.0 / 64.0;
 
-/// Watches the loop behind `host`, makes the changes that `turn` returns until it returns the end, and writes the log's
-/// folder, if requested.
+/// Watches the loop behind `host` and makes the changes that `turn` returns, until `turn` returns the end. Writes the
+/// log's folder, if requested.
 ///
 /// The board answers a change before the next one is requested. A refused change is recorded, and the loop
 /// continues unchanged.

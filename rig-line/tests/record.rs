@@ -34,8 +34,8 @@ fn play(
     (result, kept)
 }
 
-/// Repeats are whole: the valve as commanded, and samples that follow each other
-/// (the channel counts them).
+/// Checks that repeats are complete: the valve moved as commanded, and the samples follow each
+/// other without a gap (the channel counts them).
 fn whole(command: &Command, kept: &[Vec<Sample>]) {
     for repeat in kept {
         assert!(command.levels().eq(repeat.iter().map(|s| s.open)));

@@ -505,8 +505,8 @@ fn paper_model(folder: &Path) -> PathBuf {
     path
 }
 
-/// At half the friction an unknown King's law costs attachment (docs/law.md). The records do not support it, so the
-/// law is written with a warning, and the constants do not mention it.
+/// At half the friction an unknown King's law causes a loss of attachment (docs/law.md). The records do not support
+/// it, so the law is written with a warning, and the constants do not mention it.
 #[test]
 fn stress_warns_and_refuses_nothing() {
     let folder = tempfile::tempdir().expect("a folder");

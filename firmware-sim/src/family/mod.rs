@@ -87,8 +87,9 @@ pub struct RigPlan {
 }
 
 impl RigPlan {
-    /// A random rig of a family that hides the named effects: of the catalogue, laws of
-    /// [`Altered`](crate::plant::Altered), physics [`Beyond`](crate::plant::Beyond) it, or [`Fault`](crate::plant::Fault)s.
+    /// A random rig of a family with the named effects hidden. These may be effects of the catalogue, laws of
+    /// [`Altered`](crate::plant::Altered), physics of [`Beyond`](crate::plant::Beyond), or
+    /// [`Fault`](crate::plant::Fault)s.
     ///
     /// Effects are drawn from their usual ranges until they are detectable, and the flow is drawn anew if none is.
     /// Detectable means three changes of the readings on a random on/off command, in standard errors of the

@@ -58,7 +58,8 @@ impl PlantSpec {
         }
     }
 
-    /// The delay in force: a hidden effect's, if one is a delay law, otherwise the base plant's.
+    /// The delay of the plant: that of a hidden delay law if there is one, otherwise that of the
+    /// base plant.
     pub fn delay(&self) -> FlowDelay {
         let parts = self.parts(&Surroundings::default()).into_iter();
         parts.fold(self.base.delay, |law, part| match part {

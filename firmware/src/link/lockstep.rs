@@ -1,9 +1,9 @@
 //! The dialogue between host and board: the host sends readings, the board
 //! answers with predictions and decisions.
 //!
-//! Every request carries a number and is answered by exactly one reply with the same number. A request that comes
-//! again (its reply was lost) gets the same reply and is not executed twice. A damaged request is reported, and the
-//! host sends it again. A lost byte is therefore either recovered or reported; the two sides never lose step.
+//! Every request carries a number and is answered by exactly one reply with the same number. A request that comes again
+//! (its reply was lost) gets the same reply and is not executed twice. A damaged request is reported, and the host
+//! sends it again. A lost byte is therefore either recovered or reported; the two sides are always at the same step.
 //!
 //! | request | content after kind (1 byte) and number (2 bytes, low first) | reply's content after the same |
 //! |---|---|---|

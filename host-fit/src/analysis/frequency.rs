@@ -112,15 +112,15 @@ pub fn frequency_response(model: &Model, command: u8, longest_s: f64) -> Option<
     })
 }
 
-/// Estimates Σ U*Y / Σ |U|² of the frequency response of measured y and of the model's free run, in bands of frequency; sums
-/// over segments ([Welch](super::spectrum())) and over the lines of a band. Only bands in which u and y are coherent at the 5 %
-/// level.
+/// Estimates Σ U*Y / Σ |U|² of the frequency response of measured y and of the model's free run, in bands of frequency;
+/// sums over segments ([Welch](super::spectrum())) and over the lines of a band. Only bands in which u and y are
+/// coherent at the 5 % level are given.
 ///
-/// For a plant that is not linear this is its best linear approximation under the command of the records; the remainder counts
-/// as noise. Limits are those of the random error, s.d. of ln |G| and of the phase √((1 − γ²)/(2 (n − 1) γ²)) with the
-/// coherence γ² and n independent averages (Bendat and Piersol, Random Data, 4th ed., §9.2), with Student's t. `full` is the
-/// change of u for a full jet. `dead_time` in samples is taken out before a band is averaged, so that a turning phase does not
-/// lower the magnitude, and is put back.
+/// For a plant that is not linear this is its best linear approximation under the command of the records; the remainder
+/// counts as noise. Limits are those of the random error, s.d. of ln |G| and of the phase √((1 − γ²)/(2 (n − 1) γ²))
+/// with the coherence γ² and n independent averages (Bendat and Piersol, Random Data, 4th ed., §9.2), with Student's t.
+/// `full` is the change of u for a full jet. The phase of `dead_time` (samples) is removed before a band is averaged,
+/// because a phase that varies within the band would lower the magnitude, and is added again afterwards.
 #[must_use]
 pub fn estimated_response(residuals: &Residuals, full: f64, dead_time: usize) -> Vec<Estimate> {
     let Some(segments) = Segments::of(residuals) else {

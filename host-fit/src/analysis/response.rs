@@ -65,7 +65,8 @@ pub fn step_response(model: &Model) -> Option<StepResponse> {
 /// The response of `model` to a small step of the command at a level of [`step_response`]: rest (`command` 0) or the
 /// steady blown state (`command` 1). Change of y per full jet, from the sample of the step on, until it has settled.
 ///
-/// None as for [`step_response`], if y does not settle, or if the response is not proportional to a small step.
+/// None if there is no [`step_response`], if y does not settle, or if the response is not proportional to a small
+/// step.
 pub(super) fn small_step(model: &Model, command: u8) -> Option<Vec<f64>> {
     let level = f64::from(command);
     let mut reach = reach(model)?;

@@ -3,8 +3,8 @@
 //! On the *trajectory* of one plant through the record, one edge is moved in time. The best shift d of its response,
 //! K·Δu·(s(t − a − d) − s(t − a)), explains the residual around the edge, together with an offset. In a *window* an
 //! edge has its own level, initial state and gain, and shares only the time constants with the other edges. The time
-//! constants are searched in the windows too, because a fit with one dead time takes differences of dead times between
-//! edges for a second time constant.
+//! constants are searched in the windows too, because a fit with one dead time describes different dead times of the
+//! edges by a second time constant.
 
 use super::linear::{Series, evaluate, prewhiten};
 use super::onset::Unmeasured;

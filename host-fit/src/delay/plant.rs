@@ -5,9 +5,10 @@
 //! S is the sum of the time constants T₁ + T₂; b = T₁T₂/S². b = 0 is first order, b = ¼ two equal time constants, b
 //! above ¼ an underdamped plant (damping ratio 1/(2√b)). u is held between samples; h need not be a whole number of
 //! samples. S may differ between command on and off, and h between rising and falling edges: the simplest bilinear
-//! plant. It is linear in K, in the level and in the initial state in any case.
+//! plant. The plant is always linear in K, in the level and in the initial state.
 //!
-//! A third lag T₃ in series may follow, by the trapezoidal rule between samples: accurate to 1/(12·T₃²) of a response.
+//! A third lag T₃ in series may follow. It is computed by the trapezoidal rule between samples, with an error of
+//! 1/(12·T₃²) of a response.
 
 /// With a smaller ratio the second time constant counts as 0.
 const FIRST_ORDER: f64 = 1e-5;

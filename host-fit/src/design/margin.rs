@@ -3,7 +3,7 @@
 //! The plant is the model with delays, gain and time constants multiplied by factors. Rays start at the model
 //! in the planes of two logarithmic factors; bisection finds the point on each ray where attachment is lost
 //! in one of several seeded runs, or the rms error exceeds twice that on the model. This is a sampled region
-//! without a certificate: it says nothing between rays, or about other model errors.
+//! without a certificate: it gives no statement between the rays or about other model errors.
 
 use super::bench::Player;
 use super::noise::Noisy;

@@ -3,8 +3,8 @@
 //! Each is the model with one change as large as the records allow and everything else refitted: delay, gain
 //! and time constants at the ends of their 95 % intervals; each effect of the catalogue at the largest size
 //! not excluded; delay laws that fit equally well; and for each effect of the model the other members of its
-//! equivalence set. In addition: effects at the size that a diagnosis detects with 80 % power. Where that is
-//! more than the records allow, these only warn.
+//! equivalence set. In addition: effects at the size that a diagnosis detects with 80 % power. If that size
+//! is larger than the records allow, the trial only gives a warning.
 
 use super::bench::Player;
 use super::record_judge::{RecordJudge, Refitted};

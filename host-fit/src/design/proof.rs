@@ -2,7 +2,7 @@
 //! stress.
 //!
 //! A law that loses attachment on the model or on a possible plant is rejected. Stress tests are reported and
-//! never reject a law: a plant of nearest physics with every effect of the catalogue at its worst, and
+//! never reject a law: the nearest physical plant with every effect of the catalogue at its worst, and
 //! conditions beyond the design.
 
 use super::bench::Player;
@@ -37,7 +37,8 @@ pub enum CaseGroup {
 }
 
 impl CaseGroup {
-    /// Whether losing attachment in this group rejects the law; otherwise it only warns.
+    /// Whether a loss of attachment in this group rejects the law; otherwise it only gives a
+    /// warning.
     #[must_use]
     pub fn decides(self) -> bool {
         matches!(self, Self::Model | Self::Possible)

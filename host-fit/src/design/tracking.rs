@@ -325,8 +325,8 @@ fn settled(rate: f64, ripple: f64, density: f64, period_s: f64) -> f64 {
 /// `law` limited to `rate` switches per sample, for a flow that needs `duty`.
 ///
 /// The switching budget fixes the time between two openings, whatever duty the flow needs. The hold time of
-/// the shorter part is slightly less than its duration, so that the law knows its ripple and the budget
-/// remains the limit.
+/// the shorter part is slightly less than its duration, so that the law knows its ripple, but the budget
+/// limits the switching rate.
 fn paced(law: &Track, rate: f64, duty: f64) -> Track {
     let cycle = 2.0 / rate;
     let duty = duty.clamp(0.02, 0.98);

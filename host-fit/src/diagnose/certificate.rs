@@ -25,8 +25,8 @@ pub struct Certificate {
     pub alpha: f64,
     /// Names of the records from which the certificate was computed.
     pub records: Vec<String>,
-    /// Of the variance that the best model without the effect leaves unexplained: the share that the model with the
-    /// effect explains. At most 1; negative if the model with the effect leaves more variance unexplained. Models that
+    /// Share that the model with the effect explains of the variance that the best model without it leaves
+    /// unexplained. At most 1; negative if the model with the effect leaves more variance unexplained. Models that
     /// imitate the effect with more parameters and less evidence do not count.
     #[serde(skip)]
     pub share: f64,
@@ -113,7 +113,8 @@ impl Session<'_> {
         self.certificate(subject, own, &nulls, found)
     }
 
-    /// Whether the given model imitates the effects of `model`: it has none of them, more parameters and less evidence.
+    /// Whether the given model imitates the effects of `model`: it has none of these effects, but more parameters, and
+    /// less evidence.
     pub(super) fn given_imitates(&self, model: &Hypothesis) -> bool {
         let names = model.terms.iter().filter_map(Term::effect);
         let names: Vec<&str> = names.map(|effect| effect.name).collect();
@@ -180,9 +181,10 @@ impl Session<'_> {
         })
     }
 
-    /// The certificate of each effect of `subject`: the largest evidence of the models with the effect over the largest of
-    /// the models that contain neither the effect nor another member of its equivalence set. Such a model may have more
-    /// evidence than `subject` because of its other terms; the effect is therefore also added to it.
+    /// The certificate of each effect of `subject`: the largest evidence of the models with the effect, divided by the
+    /// largest evidence of the models that contain neither the effect nor another member of its equivalence set. A
+    /// model without the effect may have more evidence than `subject` because of its other terms; the effect is
+    /// therefore also added to such models.
     pub(super) fn certificates(
         &self,
         subject: &Hypothesis,

@@ -4,9 +4,9 @@
 //! robust estimates are computed, and the larger counts for each coordinate. Sums of J·r over blocks much
 //! longer than the correlation time are uncorrelated; their outer products give the *sandwich* estimate
 //! (batch means), which misses disturbances longer than a block. The *jackknife* over records, to first
-//! order, includes these, because each record would give different parameters. With few records it is
-//! uncertain, which Student's t allows for (MacKinnon, Nielsen and Webb 2023, J. Econometrics 232:272, advise
-//! this for few clusters).
+//! order, includes such long disturbances, because each record would give different parameters. With few
+//! records the jackknife is uncertain; Student's t allows for this (MacKinnon, Nielsen and Webb 2023, J.
+//! Econometrics 232:272, advise this for few clusters).
 
 use super::levenberg::Part;
 use super::rules::RULES;

@@ -314,9 +314,9 @@ fn overfitted(scores: &Scores, model: &Model) -> Option<String> {
     })
 }
 
-/// Identifies a model on the identify records of `set`. The delays are found by search, and the coefficients by
-/// least squares within it. If the objective is the free run, the coefficients are refined on it, and kept if the
-/// validation error falls.
+/// Identifies a model on the identify records of `set`. The delays are found by search, and for each candidate the
+/// coefficients by least squares. If the objective is the free run, the coefficients are refined on it, and kept
+/// if the validation error falls.
 ///
 /// ```
 /// use host_fit::data::DataSet;

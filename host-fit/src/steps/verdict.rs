@@ -280,7 +280,8 @@ fn behaviour(diagnosis: &Diagnosis) -> String {
     each.collect::<Vec<_>>().join("; and ")
 }
 
-/// The claim: effects by name in a flow, by behaviour elsewhere, each with its equivalence set.
+/// The claim of a diagnosis. In a flow, effects are stated by name, in other plants by behaviour,
+/// each with its equivalence set.
 fn claim(diagnosis: &Diagnosis, plant: Plant) -> String {
     match plant {
         Plant::Flow => missing(&diagnosis.missing, &diagnosis.sets),

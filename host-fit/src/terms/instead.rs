@@ -207,8 +207,8 @@ impl Screen<'_> {
     /// The `terms` of this model that are not needed by a first-order prediction, and by how much ln of the error then
     /// rises. A term is not needed if its penalty is larger than the rise. `sum` is the sum of squares of the error.
     ///
-    /// Taking terms away changes the free run by Σd; the other parameters follow, and what remains of Σd raises the
-    /// sum of squares.
+    /// Removing terms changes the free run by Σd. The other parameters compensate part of Σd, and the remaining part
+    /// raises the sum of squares.
     fn needless(&self, terms: &[Term], lean: &Model, sum: f64) -> (Vec<usize>, f64) {
         /// The change of the free run when a term is taken away.
         struct Taken {

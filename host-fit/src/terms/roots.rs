@@ -102,8 +102,8 @@ impl Search<'_> {
             .collect()
     }
 
-    /// Whether an effect that is not in `base` is fitted from fresh starts, because a few iterations do not return from the
-    /// parameters of a base that was fitted without it.
+    /// Whether an effect that is not in `base` is fitted from fresh starts: if `base` was fitted without the effect, a
+    /// few iterations from its parameters may not converge.
     pub(super) fn is_fitted_anew(&self, base: &Model, spec: &Spec) -> bool {
         !base.has_effect(spec.name) && needs_fresh_starts(base, spec)
     }

@@ -418,8 +418,8 @@ fn frames() -> Vec<Vec<u8>> {
     seeds
 }
 
-/// Bytes from the line to either end, and the same bytes as the content of a valid frame, because the checksum
-/// would reject them otherwise.
+/// Passes bytes from the line to either end, and passes the same bytes as the content of a valid frame,
+/// because the checksum would reject them otherwise.
 fn framed(input: &[u8]) -> String {
     let mut receiver = Receiver::new();
     let mut said = (0, 0, "");

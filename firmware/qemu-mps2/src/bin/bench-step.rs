@@ -1,5 +1,5 @@
-//! Instructions of one step of Table II's model: model-core's, those of C by hand and
-//! those of the exported C, in one run. Sends nine numbers over the serial line and stops.
+//! Counts the instructions of one step of Table II's model in model-core, in C by hand and in the
+//! exported C, in one run. Sends nine numbers over the serial line and stops.
 #![no_std]
 #![no_main]
 

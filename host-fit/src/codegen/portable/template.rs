@@ -1,7 +1,7 @@
 //! Templates of generated files: text in the target language with holes.
 //!
-//! - `@name@` is replaced by a text. Alone in its line it may have several lines, which get the indentation of the
-//!   hole, or none.
+//! - `@name@` is replaced by a text. A hole alone in its line may be replaced by several lines, which get the
+//!   indentation of the hole, or by no line.
 //! - The lines between `@if name` and `@end` are kept if the text `name` is not empty; the lines after `@else` are kept
 //!   if it is empty.
 //! - The lines between `@for name` and `@end` are repeated for each row of the list `name`.

@@ -10,7 +10,8 @@ use crate::linalg::symmetric_eigenvalues;
 use crate::rules;
 
 rules! {
-    /// Excitation: criteria for the commands of a data set, and when a remark is made.
+    /// Excitation: criteria for the commands of a data set, and limits beyond which a remark is
+    /// made.
     pub struct Rules in "excitation";
 
     /// Number of lags in the covariance.

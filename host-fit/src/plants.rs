@@ -374,7 +374,8 @@ mod tests {
         clock.model_out(&model)
     }
 
-    /// t → c·t: the law is the same, and its results are the same with all times multiplied by c.
+    /// If all times of the data are multiplied by c, the law is the same, and all times in its
+    /// results are multiplied by c.
     #[test]
     fn a_slower_clock_changes_times_and_nothing_else() {
         let near = |a: f64, b: f64| (a - b).abs() <= 1e-6 * a.abs().max(1e-3);

@@ -111,8 +111,8 @@ impl<'a> Signals<'a> {
         }
     }
 
-    /// Scale of the divergence limit: the range of the measured output and its distance from 0; without a
-    /// measurement, or if it is 0, `usual`.
+    /// Scale of the divergence limit: the range of the measured output and its distance from 0. Without a
+    /// measurement, or if the scale would be 0, it is `usual`.
     fn scale(&self, usual: f64) -> f64 {
         let largest = |y: &[f64]| y.iter().fold(0.0, |m: f64, y| m.max(y.abs()));
         let measured = self.y.map(largest).filter(|most| *most > 0.0);

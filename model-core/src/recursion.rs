@@ -15,7 +15,7 @@ pub enum LagConvention {
 }
 
 impl LagConvention {
-    /// How far behind the newest sample y_k the lag `tau` reads.
+    /// Number of samples between the newest sample y_k and the sample that the lag `tau` reads.
     #[inline]
     #[must_use]
     pub const fn behind_newest(self, tau: u16) -> usize {

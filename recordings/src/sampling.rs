@@ -137,8 +137,8 @@ impl PrintedTimes {
     }
 
     /// The time over which the mean step is computed, s, and its number of steps. If times repeat, the span extends
-    /// from one change of the printed time to another. A change is known to within a step; other times are known to
-    /// within the printed unit only.
+    /// from one change of the printed time to another. The time of a change is known to within one step; other
+    /// times are known only to within the printed unit.
     pub(crate) fn span(&self) -> (f64, usize) {
         let changes =
             || (1..self.time.len()).filter(|&row| self.time.get(row) > self.time.get(row - 1));

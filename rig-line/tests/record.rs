@@ -266,7 +266,8 @@ fn a_rig_without_air_or_at_a_rail_is_not_calibrated() {
     }
 }
 
-/// The law runs, then the sensor's zero moves: the log begins at rest, and the check of the model raises the alarm.
+/// The zero of the sensor moves while the law runs. The log must begin at rest, and the check of the model must
+/// raise the alarm.
 #[test]
 fn a_loop_is_watched_logged_and_judged() {
     use rig_line::alarm::{Test, Verdict};

@@ -69,8 +69,8 @@ fn a_memory_of_the_flow_is_no_missing_effect() {
     is_found(&row);
 }
 
-/// The identified model alone is near the noise level: a wake with an unknown initial state, and a delay that
-/// shortens only up to a level.
+/// For two rigs the identified model is near the noise level without a hidden effect: a wake with an unknown
+/// initial state, and a delay that shortens only up to a level.
 #[test]
 #[ignore = "half a minute of processor time: cargo xtask kept-rigs"]
 fn the_default_model_comes_near_the_noise_in_mid_run_and_under_other_laws() {
@@ -226,7 +226,7 @@ fn other_units_change_no_name_and_transform_the_parameters() {
     }
 }
 
-/// The paper's own step: a fixed-delay model of a flow with a state-dependent delay.
+/// The flow has a state-dependent delay and the model a fixed one. The paper made the same step.
 #[test]
 fn a_state_dependent_delay_is_the_first_hidden_effect() {
     let row = diagnosed(

@@ -1,4 +1,5 @@
-//! A law at any loop period: designed, its constants written; invalid periods are refused first.
+//! A law can be designed, and its constants written, for any valid loop period. Invalid periods are
+//! refused before the design.
 
 use std::path::Path;
 use std::process::Output;

@@ -29,8 +29,8 @@ pub struct Sample {
     pub channel: u16,
     /// The valve from this sample to the next.
     pub open: bool,
-    /// While the law runs: the model's predicted reading, and the deviation of the reading from it, counts of the
-    /// sensor.
+    /// Predicted reading of the model and deviation of the reading from it, both in counts of the sensor. `None`
+    /// if the law does not run.
     pub law: Option<Law>,
 }
 

@@ -69,7 +69,7 @@ pub trait Bench: Send + Sync + 'static {
     /// # Errors
     /// [`Refusal`] in words for the user.
     fn select(&self, model: u32) -> Result<(), Refusal>;
-    /// Other quick queries and changes: a JSON document for a JSON document.
+    /// Answers other quick queries and makes quick changes. Question and answer are JSON documents.
     ///
     /// # Errors
     /// [`Refusal`] in words for the user.

@@ -1,4 +1,4 @@
-//! The book: the pages of `docs` with the catalogue's, built by mdBook.
+//! Builds the book with mdBook from the pages of `docs` and those of the catalogue.
 //!
 //! Pages of effects are written from the cards (`host-fit effects --json`) and checked in, so that links to them hold without a build.
 

@@ -62,9 +62,10 @@ const NEIGHBOURS: [f64; 2] = [4.0 / 9.0, 1.0 / 36.0];
 /// Share of the largest density of the command below which it does not count as excitation.
 const EXCITED: f64 = 1e-9;
 
-/// The frequency response of `model`, linearised at a level of the step response ([`step_response`](super::step_response)):
-/// at rest (`command` 0), or in the steady blown state (`command` 1). With its effects; from 1/`longest_s` (or the inverse of
-/// the settling time, if that is longer) to half the sampling rate.
+/// The frequency response of `model`, linearised at a level of the step response
+/// ([`step_response`](super::step_response)): at rest (`command` 0), or in the steady blown state (`command` 1). The
+/// effects of the model are included. The frequencies go from 1/`longest_s` (or the inverse of the settling time, if
+/// that is longer) to half the sampling rate.
 ///
 /// None if there is no step response, or if the model is not linear for small changes at this level.
 #[must_use]

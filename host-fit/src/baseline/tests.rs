@@ -37,7 +37,8 @@ fn command(samples: usize, mean_time: f64, noise: &mut Noise) -> Vec<f64> {
     u
 }
 
-/// Small Euler steps of two lags in series behind a dead time of whole samples, as an independent simulation.
+/// Independent simulation with small Euler steps: a dead time of whole samples, then two first-order lags in
+/// series.
 fn simulated(u: &[f64], slow: f64, fast: f64, dead: usize, level: f64, gain: f64) -> Vec<f64> {
     const STEPS: usize = 400;
     let (mut first, mut second) = (u[0], u[0]);

@@ -122,8 +122,8 @@ fn direction_test(points: &[DelayPoint]) -> Option<(f64, f64)> {
 }
 
 /// Permutation test: probability that a law fits as well when the delays are randomly reassigned to the ỹ.
-/// With `within`, only among edges of one direction, whose means are removed first. Exact for any noise and
-/// any number of rates tried.
+/// With `within`, the delays of rising edges and those of falling edges are reassigned separately, after
+/// the mean of each group is removed. The test is exact for any noise and any number of rates tried.
 fn permutation_test(points: &[DelayPoint], within: bool, seed: u64) -> Option<f64> {
     let groups: Vec<Vec<usize>> = if within {
         [true, false]

@@ -35,8 +35,9 @@ struct Case {
     record: Record,
 }
 
-/// First or second order, time constants 5 to 400 samples, dead time 0 to 100, 1 to 40 edges on/off or graded, either
-/// sign, resting at any level, at rest with u = 0 or 1 or in mid-run, noise 0.1 to 3 % of the step, quantised or not.
+/// A random test case: first or second order, time constants 5 to 400 samples, dead time 0 to 100, 1 to 40 edges
+/// on/off or graded, either sign, resting at any level, at rest with u = 0 or 1 or in mid-run, noise 0.1 to 3 % of
+/// the step, quantised or not.
 fn case(seed: u64, period: f64) -> Case {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let t1 = 5.0 * 80f64.powf(rng.random());

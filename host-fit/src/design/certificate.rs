@@ -474,7 +474,7 @@ mod tests {
         assert!(none <= 2, "{none} of 16 without a bound");
     }
 
-    /// The bound holds on the model only: without corrections a flow with other levels leaves it.
+    /// The bound holds only for the model. Without corrections, a flow with other levels leaves it.
     #[test]
     fn another_flow_is_outside_the_certificate() {
         let model = model();

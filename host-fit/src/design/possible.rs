@@ -44,8 +44,8 @@ impl PossibleFlow {
     }
 }
 
-/// The plants that the records of `prepared` do not exclude beside `model`; none if the records contain no
-/// information about it.
+/// The plants, other than `model`, that the records of `prepared` do not exclude. None if the records
+/// contain no information about `model`.
 ///
 /// # Errors
 /// A missing channel, or a model whose free run diverges.

@@ -39,7 +39,7 @@ impl Certificate {
         self.log_e >= -self.alpha.ln()
     }
 
-    /// The p-value that the e-value bounds: by Markov's inequality at most its inverse.
+    /// Upper bound of the p-value: the inverse of the e-value (Markov's inequality).
     #[must_use]
     pub(super) fn p_value(&self) -> f64 {
         p_of(self.log_e)

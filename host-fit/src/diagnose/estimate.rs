@@ -159,7 +159,8 @@ mod tests {
         assert!(!known(0.5));
     }
 
-    /// Ratio and offset of King's law are correlated: one of them is enough.
+    /// The ratio and the offset of King's law are correlated, therefore it is enough if one of them
+    /// is known.
     #[test]
     fn one_known_parameter_of_two_identifies_an_effect() {
         let known = |ratio: f64, offset: f64| {

@@ -103,7 +103,8 @@ impl Entry {
         !matches!(self, Self::Level | Self::Reading)
     }
 
-    /// Weight of a sample for estimating g: a jet must be blowing, and a factor on y counts with y².
+    /// Weight of a sample for estimating g. A term of the jet shows only while a jet is blowing. A
+    /// term that multiplies y has the weight y².
     pub(super) fn shown_by(self, blowing: bool, y: f64) -> f64 {
         match self {
             Self::Jet => f64::from(u8::from(blowing)),

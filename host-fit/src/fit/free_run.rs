@@ -33,7 +33,8 @@ pub struct FitOptions {
     pub linear: bool,
     /// Whether the delay law is free.
     pub delay: bool,
-    /// Scatter of a record's level, if known: errors along y then have less weight.
+    /// Scatter of the level between records, if known. Errors in proportion to y then have less
+    /// weight.
     pub level_scatter: Option<LevelScatter>,
 }
 

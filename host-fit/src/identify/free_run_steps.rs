@@ -13,7 +13,8 @@ use crate::search::{Around, Evaluator, Point, SearchStep, StopReason, Success};
 /// Steps tried around the best of the predicted lags.
 const AROUND: [i32; 6] = [-1, 1, -2, 2, -4, 4];
 
-/// Search step: exchanges lags where the linearised free run predicts the best.
+/// Search step: exchanges lags for those with the lowest error predicted by the linearised free
+/// run.
 pub(crate) fn exchange_predicted(
     evaluator: &mut Evaluator<'_, FreeRun>,
     around: &Around<'_>,

@@ -4,8 +4,8 @@ use std::fmt::Write as _;
 
 use super::palette::{Colour, PAPER};
 
-/// Widths in which a picture is laid out, pixels: for half of a desk's screen, and for a phone's. Text has one size, so that it
-/// reads at both.
+/// Widths in which a picture is laid out, pixels: for half the screen of a desktop computer, and for a phone. The text
+/// has the same size in both, so that it can be read in both.
 const WIDTHS: [f64; 2] = [660.0, 420.0];
 /// Free border around a picture, pixels.
 pub(super) const MARGIN: f64 = 14.0;

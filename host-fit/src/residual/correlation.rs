@@ -35,8 +35,8 @@ pub(crate) fn correlation_length(block: usize) -> f64 {
     (block as f64 / RULES.correlation_times).max(1.0)
 }
 
-/// p-value of "the sum of these independent blocks is above 0". Their scatter is estimated from the median absolute
-/// deviation, so that an error in few blocks does not inflate it. 1 for fewer than three blocks.
+/// p-value of the claim that the sum of these independent blocks is above 0. Their scatter is estimated from the
+/// median absolute deviation, so that an error in few blocks does not inflate it. 1 for fewer than three blocks.
 pub(crate) fn p_above(blocks: &[f64]) -> f64 {
     let n = blocks.len() as f64;
     if n < 3.0 {

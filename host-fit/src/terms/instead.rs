@@ -19,7 +19,7 @@ use crate::order;
 use crate::parallel;
 use model_core::effect::Place;
 
-/// An effect with the base terms that are predicted to be needed beside it.
+/// An effect together with the base terms that are predicted to be needed with it.
 struct Begun {
     terms: Vec<Term>,
     fit: Fit,

@@ -108,8 +108,8 @@ impl Search<'_> {
         !base.has_effect(spec.name) && needs_fresh_starts(base, spec)
     }
 
-    /// `base` with an effect, from fresh starts; `None` if the records cannot identify the effect beside the fitted dead
-    /// time.
+    /// `base` with an effect, fitted from fresh starts. `None` if records with the fitted dead time cannot identify the
+    /// effect.
     pub(super) fn fitted_anew(
         &self,
         base: &Model,

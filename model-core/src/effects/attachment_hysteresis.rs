@@ -1,4 +1,5 @@
-//! Hysteresis of attachment: an attached flow stays attached at a friction at which it would not attach.
+//! Hysteresis of attachment: an attached flow stays attached at a friction at which a separated flow
+//! would not attach.
 
 use crate::effect::{
     Amplitude, Effect, Flow, Instant, Parameter, Physics, Place, Setting, Spec, StartValue, Starts,

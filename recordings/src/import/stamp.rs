@@ -427,7 +427,8 @@ mod tests {
         assert_eq!(days_from_civil(2024, 9, 17), Some(19_983));
     }
 
-    /// The order with the shorter record applies: 5 and 6 June, not 6 May and 6 June. A 13 can only be a day.
+    /// Of the two orders of day and month, the one that gives the shorter record applies: 5 and 6 June, not 6
+    /// May and 6 June. A number of 13 can only be a day.
     #[test]
     fn the_order_of_day_and_month_is_that_of_the_shorter_record() {
         assert_eq!(

@@ -180,8 +180,8 @@ fn run(hands: &Hands, mut line: UnixStream) {
     }
 }
 
-/// The board's end of the line. A host that waits for a processor has not stopped reading: the line waits for it,
-/// because a real line would not overflow then.
+/// The board's end of the line. A host that waits for a processor has not stopped reading. The line waits for
+/// such a host, because a real line would not overflow in this time.
 #[derive(Default)]
 struct Told {
     /// Whether the host has stopped reading. Determined once, so that the board's time continues.

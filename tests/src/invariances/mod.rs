@@ -151,7 +151,8 @@ pub fn run(options: &Options, tell: impl Fn(&Broken) + Sync) -> std::io::Result<
     Ok(outcome)
 }
 
-/// The changes of one rig that made a difference, and whether that is a near tie.
+/// The changes of one rig that made a difference, and for each whether the difference is a near
+/// tie.
 fn rig(
     seed: u64,
     strangers: &[records::Base],

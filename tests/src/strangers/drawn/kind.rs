@@ -29,7 +29,8 @@ pub(super) struct Drawn {
     pub(super) dead_time: Option<f64>,
     /// The channel that drives y as well.
     pub(super) input: Option<&'static str>,
-    /// Whether a disturbance is in y that no effect describes, so that "unexplained" is right too.
+    /// Whether y contains a disturbance that no effect describes. The verdict "unexplained" is then
+    /// also right.
     pub(super) disturbed: bool,
     /// Further options of `import`.
     pub(super) import: Vec<String>,

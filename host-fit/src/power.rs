@@ -53,7 +53,7 @@ pub struct Detectable {
     pub amplitude: Option<f64>,
     /// All parameters of the effect at that amplitude, in the order of its card.
     pub parameters: Vec<f64>,
-    /// The amplitude in words, which begin with those of the effect.
+    /// The amplitude in words, beginning with `subject`.
     pub words: String,
     /// The words of the effect.
     #[serde(skip)]

@@ -64,7 +64,7 @@ pub struct Signals<'a> {
     /// The command before the first sample, as fraction of a full jet. None: 0 for a model that starts from
     /// rest, the first value otherwise.
     pub u_before: Option<f64>,
-    /// y before the first sample; none: the first value.
+    /// y before the first sample. If it is unknown, the first value is used.
     pub y_before: Option<f64>,
     /// y of the first samples, which the run follows.
     pub followed: &'a [f64],

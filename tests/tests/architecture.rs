@@ -21,7 +21,7 @@ fn dependencies(package: &str) -> BTreeSet<String> {
     names.filter(ours).collect()
 }
 
-/// From bottom to top, with the allowed dependencies of each.
+/// The crates from bottom to top, each with its allowed dependencies.
 const CRATES: [(&str, &[&str]); 8] = [
     ("model-core", &[]),
     ("wire", &["model-core"]),

@@ -32,7 +32,7 @@ impl RigPlan {
             Character::RateOfFriction { .. } => Some(&["y"][..]),
         };
         let flow = flow.map(|coordinates| Truth::new(Port::Flow, coordinates));
-        // A memory that is lost under the jet acts as a factor on the jet.
+        // A memory that the jet reduces has the same effect as a factor on the jet.
         let jet = match &self.plant.character {
             Character::Memory(terms) if terms.iter().any(|term| term.lost != 0.0) => {
                 Some(Truth::new(Port::Jet, &["past y"]))

@@ -292,7 +292,7 @@ mod tests {
         let s = hold(&mut flow, 1.0, t);
         assert!((s - expected).abs() < 1e-7, "{s} {expected}");
         assert!((hold(&mut flow, 1.0, 5.0) - 1.0 / (1.0 - k)).abs() < 1e-9);
-        // Without the jet only the gain remains, and the flow returns to rest.
+        // Without the jet the level is gain·s(t − delay), and the flow returns to rest.
         let s = hold(&mut flow, 0.0, 0.1);
         let blown = 1.0 / (1.0 - k);
         let level = gain * blown;

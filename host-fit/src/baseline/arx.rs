@@ -169,7 +169,7 @@ fn least_squares(series: &[Series], delay: usize) -> Option<Arx> {
     arx.is_stable().then_some(arx)
 }
 
-/// Second orders with the poles of an ARX(2,2), for a few delays.
+/// Second-order shapes with the poles of an ARX(2,2) model, one for each of a few delays.
 pub(super) fn shapes(series: &[Series]) -> Vec<Shape> {
     let mut shapes = Vec::new();
     for delay in [0, 1, 3, 8, 20] {

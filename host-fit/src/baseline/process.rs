@@ -15,7 +15,7 @@ const SLOWEST: f64 = 30.0;
 /// Starting points from which a descent is made.
 const DESCENTS: usize = 3;
 
-/// Shorter time constants, in samples, are not visible in a sampled response.
+/// Time constants below this, in samples, are not visible in a sampled response.
 const NO_TIME: f64 = 0.05;
 
 /// T·y′ + y = level + gain·u(t − dead time).

@@ -310,7 +310,8 @@ mod tests {
                 *count += u32::from(p.unwrap() < 0.05);
             }
         }
-        // Of 300, 15 are expected; 5–28 is ± 3.3 standard deviations.
+        // In 300 runs, 15 false alarms are expected; 5 to 28 is a range of ± 3.3 standard
+        // deviations.
         assert!(
             alarms.iter().all(|a| (5..=28).contains(a)),
             "{alarms:?} of {runs}"

@@ -25,7 +25,7 @@ const COARSE_STARTS: usize = 3;
 /// tries with it.
 const IMMEDIATE: f64 = 0.2;
 const IMMEDIATE_DELAYS: usize = 300;
-/// Largest ratio: damping ratio 0.05.
+/// Largest ratio b, at which the damping ratio is 0.05.
 pub(crate) const LARGEST_RATIO: f64 = 100.0;
 /// Ratios from which a second order starts.
 const STARTS: [f64; 3] = [0.02, 0.1, 0.25];

@@ -282,7 +282,8 @@ impl Positive {
         [low, high]
     }
 
-    /// A bound of the limit superior, given an interval that holds both limits.
+    /// Upper bound of the limit superior of y, given an interval that contains its limit inferior
+    /// and its limit superior.
     fn above(&self, target: f64, [low, high]: [f64; 2]) -> f64 {
         let [open, closed] = self.looks;
         let mixed = usize::from(self.mixes);

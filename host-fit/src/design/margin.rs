@@ -69,7 +69,7 @@ fn mistaken(model: &Model, delay: f64, gain: f64) -> Model {
 struct Slowed<F> {
     flow: F,
     times: f64,
-    /// Pending time of the flow, samples.
+    /// Time by which the flow must still be advanced, in its own samples.
     due: f64,
     reading: Option<f64>,
 }

@@ -144,7 +144,7 @@ impl Proof {
     }
 }
 
-/// The plants of the trials beside the model.
+/// The plants of the trials, in addition to the model.
 #[derive(Clone, Copy, Debug)]
 pub struct Trials<'a, F> {
     /// Flows that are consistent with the records.

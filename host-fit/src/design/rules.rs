@@ -32,7 +32,7 @@ rules! {
     /// Standard deviation of the model error assumed in the observer. Smaller: the estimate follows the
     /// model; larger: it follows the noise.
     model_error: f64 = 0.005, "share of the reachable interval", "tuned on plants other than those of docs/law.md";
-    /// Sensor noise averaged over 64 samples, if the rig's was not measured.
+    /// Sensor noise averaged over 64 samples, if the noise of the rig was not measured.
     usual_slow_noise: f64 = 0.025, "y", "a hot film: white 0.03, coloured 0.035 with 20 ms";
     /// Largest observer correction per sample.
     observer_most: f64 = 0.1, "share of the residual", "judgement";
@@ -164,6 +164,6 @@ rules! {
     /// Replanning instants per horizon of a receding-horizon law, because the end of a plan ignores what
     /// follows.
     plans: u32 = 3, "plans", "judgement";
-    /// Length of the receding-horizon run that shows its limit cycle.
+    /// Length of the run with receding horizon, long enough to show its limit cycle.
     receding: usize = 8000, "samples", "judgement";
 }

@@ -1,4 +1,4 @@
-//! Places of a term, and its entry into the model there.
+//! Places at which a term can act, and the quantity that it changes there.
 
 use crate::terms::Units;
 use model_core::effect::Unit;
@@ -31,7 +31,7 @@ impl Place {
     }
 }
 
-/// The entry of a term at its place; g is the term's value.
+/// The quantity that a term changes at its place; g is the value of the term.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Entry {
     /// The jet's strength, multiplied by 1 + g.

@@ -296,7 +296,7 @@ fn derivatives(
     Some((simulated, columns))
 }
 
-/// [`derivatives`] along less than `N` slopes, in one run.
+/// [`derivatives`] along fewer than `N` slopes, in one run.
 fn derivatives_at_once<const N: usize>(
     model: &Model,
     values: &[f64],

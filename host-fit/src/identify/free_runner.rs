@@ -273,7 +273,7 @@ impl BlockRun<'_> {
         follows.max(0.0)
     }
 
-    /// The delays of all inputs at that value.
+    /// The delays of all inputs at the averaged output `follows`, samples.
     #[inline(always)]
     fn delays(&self, follows: f64, delays: &mut [usize]) {
         for (delay, arrival) in delays.iter_mut().zip(self.arrivals) {

@@ -261,7 +261,7 @@ impl Canvas {
         ));
     }
 
-    /// A disc, or a ring on the paper's colour.
+    /// A disc, or a ring that is filled with the colour of the background.
     pub(super) fn dot(&mut self, (x, y): (f64, f64), radius: f64, ink: Ink, filled: bool) {
         let style = if filled {
             ink.fill()

@@ -40,7 +40,7 @@ pub(super) fn min_max(values: &[f64], range: Range<usize>, columns: usize) -> Ve
     pieces
 }
 
-/// `range` cut into `columns` parts of equal length, to one sample.
+/// `range`, divided into `columns` parts whose lengths differ by at most one sample.
 pub(super) fn split(range: Range<usize>, columns: usize) -> impl Iterator<Item = Range<usize>> {
     let (start, length) = (range.start, range.len());
     // The arithmetic is 128 bits wide, because length × column may overflow.

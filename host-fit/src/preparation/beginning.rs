@@ -61,7 +61,7 @@ impl Rest {
     }
 }
 
-/// A straight-line fit of y to a constant and one shape.
+/// A least-squares fit of y by a constant and one shape.
 struct Shape {
     /// Sum of squares of the residual.
     left: f64,
@@ -202,7 +202,7 @@ impl Beginning {
             && *at >= 0.5 * (1.0 + RULES.surely_before) * dead_time
         {
             let rest = ((RULES.surely_before * at).floor() as usize).max(1);
-            // y must not move before that response.
+            // y must not move before the response `answer`.
             let trend = Shape::of(&y[..rest.min(window)], |k| k as f64);
             let noise = trend.left / (rest as f64 - 2.0).max(1.0);
             if rest < RULES.fewest_at_rest || trend.motion <= RULES.motion_over_noise * noise {
@@ -512,7 +512,7 @@ mod tests {
             let (u, y) = (command[from..to].to_vec(), y[from..to].to_vec());
             Record::new("part", Use::Identify, 0.001, u, y)
         };
-        // The second begins 20 samples after a rising edge, far below 1.
+        // The second record begins 20 samples after a rising edge, while y is still far below 1.
         let records = [part(0, 381), part(381, 900)];
         let reference = FirstOrder::fitted(&records).unwrap();
         let rests = |command: f64| Beginning {
@@ -538,7 +538,7 @@ mod tests {
             let (u, y) = (command[from..].to_vec(), y[from..].to_vec());
             Record::new("part", Use::Identify, 0.001, u, y)
         };
-        // The third begins while y rises.
+        // The third record begins while y rises.
         let records = [from(0), from(301), from(650)];
         let reference = FirstOrder::fitted(&records).unwrap();
         let mut beginnings = records

@@ -138,7 +138,7 @@ mod tests {
             let (a, b) = (held_out(&mut rng), held_out(&mut rng));
             alarms += usize::from(p_value(&a, &b) < 0.05);
         }
-        // Of 400, 20 ± 4.4 are expected.
+        // In 400 trials, 20 ± 4.4 false alarms are expected.
         assert!((7..=35).contains(&alarms), "{alarms} of {trials}");
     }
 

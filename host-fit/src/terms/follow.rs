@@ -284,7 +284,7 @@ mod tests {
         Search::silent(judge, 0, &NEVER)
     }
 
-    /// A fit of that flow with these terms.
+    /// A fit of a first-order flow with these terms.
     fn begun(judge: &Judge, terms: &[Term]) -> Fit {
         let lean = Model {
             a: vec![0.98],

@@ -339,7 +339,7 @@ pub struct LawCard {
 }
 
 impl LawCard {
-    /// A law that does not change the command; without its words.
+    /// The card of a law that does not change the command, with empty `words`.
     pub const PLAIN: Self = Self {
         words: "",
         shapes_command: false,

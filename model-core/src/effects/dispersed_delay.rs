@@ -55,7 +55,7 @@ impl<T: Real> Physics<T> for DispersedDelay<T> {
     }
 }
 
-/// Standard deviation of three equal lags in series, relative to one.
+/// Standard deviation of the delay of three equal lags in series, relative to that of one lag.
 const SQRT_3: f64 = 1.732_050_807_568_877_2;
 
 #[cfg(test)]

@@ -34,7 +34,8 @@ pub(super) struct Number<'a> {
 pub(super) enum Decimals {
     Point,
     Comma,
-    /// Undecided or mixed: a single mark is the decimal separator.
+    /// Undecided, or not the same in all cells: a mark that occurs only once in a number is its
+    /// decimal separator.
     Each,
 }
 

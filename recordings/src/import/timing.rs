@@ -226,7 +226,8 @@ fn counted_from(first: &str) -> String {
     format!("time is counted from the first row ({first})")
 }
 
-/// A clock with the dates of the file, or dates with the clock.
+/// Clock times together with the only column of dates in the file, or dates together with the only
+/// column of clock times.
 fn with_date<'a>(
     source: &'a Source,
     time: &'a Variable,

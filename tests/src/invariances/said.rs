@@ -22,7 +22,7 @@ pub(super) struct Said {
     delays: Vec<f64>,
     fit_percent: f64,
     rmse: f64,
-    /// 1 − the larger of the poles, open and closed.
+    /// 1 minus the larger of the largest pole magnitudes with the valve open and closed.
     decay: f64,
     /// Mean of the measured edges, samples.
     edges: Option<f64>,

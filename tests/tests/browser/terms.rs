@@ -61,12 +61,12 @@ fn set(folder: &Path, samples: usize, records: &[Asked], jet: fn(&mut f64, f64, 
     std::fs::write(folder.join("dataset.toml"), manifest).expect("a manifest");
 }
 
-/// Irregular switches, as a telegraph's.
+/// A random number of samples until the next switch, 40 to 400.
 fn telegraph(chance: &mut Chance) -> usize {
     40 + (360.0 * chance.even()) as usize
 }
 
-/// The leanest model, in no time.
+/// Script that requests a small model with a short search.
 const LEAN: &str = "(() => { const f = document.getElementById('identify').elements; f.delay.value = 'fixed'; f.n1.value = 1; f.n2.value = 1; f['max-lag'].value = 60; f.evaluations.value = 300; f.n1.form.requestSubmit(); })()";
 
 #[test]

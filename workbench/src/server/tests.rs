@@ -137,7 +137,7 @@ fn other_names_and_other_sites_are_kept_out() {
         };
         status(&app, empty(builder.header(name, value)))
     };
-    // The names could have been rebound to this machine.
+    // An attacker could have made such a name refer to this machine (DNS rebinding).
     for host in [
         "evil.example:4321",
         "127.0.0.1",

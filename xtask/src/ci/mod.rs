@@ -73,7 +73,7 @@ const STEPS: &[Step] = &[
     // This is the README's test command, which includes documentation examples. Everything is compiled
     // before, so that the folder is locked only briefly.
     Step::new("tests", || run(&mut cargo("test --release --workspace"))).after(&[BUILD]),
-    // The bundle in reports equals the sources.
+    // Checks that the script in the report pages was built from the present sources.
     Step::new("pages", || crate::pages::pages(&["--check".to_owned()])).after(&[SET_UP]),
     Step::new("browser", || crate::browser::browser(&[])).after(&[BUILD, "pages"]),
     Step::new("lints", || {
@@ -117,7 +117,7 @@ const STEPS: &[Step] = &[
         .within(Room::Host),
     // Archive and wheel, for people without a compiler, are installed in another folder.
     Step::new("release", || crate::release::release(&[])).after(&[SET_UP, BUILD]),
-    // An effect and a delay law need one file and one line each.
+    // Checks that a new effect and a new delay law need only one file and one line each.
     Step::new("new effect", crate::new_effect::proof)
         .after(&[BUILD])
         .within(Room::Host),

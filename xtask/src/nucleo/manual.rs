@@ -47,7 +47,7 @@ pub(super) fn field(value: u32, low: u32, bits: u32) -> u32 {
     value >> low & ((1 << bits) - 1)
 }
 
-/// Core and APB2, APB1, Hz.
+/// Clock frequencies of the core with APB2, and of APB1, Hz.
 fn clocks(chip: &Chip) -> [f64; 2] {
     let (pll, buses) = (chip.value(RCC_PLLCFGR), chip.value(RCC_CFGR));
     let [m, n] = [field(pll, 0, 6), field(pll, 6, 9)].map(f64::from);

@@ -49,7 +49,7 @@ pub(super) fn archive(made: &Made) -> Result<()> {
         "its version"
     );
 
-    // Every command has a page and is completed.
+    // Every command must have a manual page and must be in the completion scripts.
     let help = said(&["--help"])?;
     let commands = help.lines().skip_while(|line| *line != "Commands:").skip(1);
     let commands: Vec<&str> = commands

@@ -6,7 +6,7 @@ use crate::plant::free_stream::FreeStream;
 use crate::plant::part::{JetPart, Part, Piece};
 
 physics! {
-    /// The jet's strength times 1 + gain·(U/Ū − 1).
+    /// The strength of the jet is multiplied by 1 + gain·(U/Ū − 1).
     FreeStreamVariation = "free-stream-variation" at FreeStream {
         const CHANNEL: Option<&'static str> = Some("u_inf");
     }

@@ -8,7 +8,7 @@
 
 use std::collections::BTreeMap;
 
-/// The texts of a template by name.
+/// The texts that are inserted into a template, by name.
 #[derive(Debug, Default)]
 pub(super) struct Holes {
     texts: BTreeMap<&'static str, String>,

@@ -125,7 +125,7 @@ impl Rig {
         }
     }
 
-    /// With a second lag in two of five cases.
+    /// A random rig, with a second lag in two of five cases.
     fn draw_any_order(rng: &mut ChaCha8Rng) -> Self {
         let mut rig = Self::draw(rng);
         if chance(rng, 0.4) {

@@ -72,8 +72,9 @@ impl Grading {
 ///
 /// with j_l the jet strength that arrives through input delay l (u_{k−h_l} if no effect shapes the command).
 /// For one input, jets of part strength and a [`Grading`] other than proportional, the flow relaxes with a
-/// rate between the separated and the attached flow's towards a level proportionally between theirs; terms
-/// with lags of [`SHORTEST_MEMORY`] and more are part of the level. On/off jets give the same result.
+/// rate between the separated and the attached flow's towards a level that lies between their levels in
+/// proportion to the jet; terms with lags of [`SHORTEST_MEMORY`] and more are part of the level. On/off jets
+/// give the same result.
 #[derive(Clone, Copy, Debug)]
 pub struct Bilinear<'a, T> {
     /// Meaning of the lags.

@@ -311,7 +311,7 @@ impl Host {
             };
             match status {
                 Status::Done => return Ok(samples),
-                // The other host may be gone and not yet released.
+                // The other host may have gone, and the board may still wait for it.
                 Status::Busy if Instant::now() < until => {
                     let _ = self.port.receive(ALIVE)?;
                     self.touch();

@@ -115,7 +115,8 @@ fn direction_test(points: &[DelayPoint]) -> Option<(f64, f64)> {
     let (_, with) = best_rate(points, None, true)?;
     let (_, without) = best_rate(points, None, false)?;
     let free = points.len().checked_sub(4).filter(|f| *f > 0)? as f64;
-    // The t value of one coefficient is the root of the F value of leaving it out.
+    // The t value of one coefficient is the square root of the F value for the fit without this
+    // coefficient.
     let t = ((without.rss - with.rss).max(0.0) * free / with.rss.max(f64::MIN_POSITIVE)).sqrt();
     let p = 2.0 * StudentsT::new(0.0, 1.0, free).ok()?.cdf(-t);
     Some((p, with.linear.get(2).copied()?))

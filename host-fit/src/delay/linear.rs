@@ -29,8 +29,8 @@ const IMMEDIATE_DELAYS: usize = 300;
 pub(crate) const LARGEST_RATIO: f64 = 100.0;
 /// Ratios from which a second order starts.
 const STARTS: [f64; 3] = [0.02, 0.1, 0.25];
-/// Prior standard deviations of ln S and b around the fit: its linearisation holds within a factor e of S and over the
-/// ratios of two lags in series.
+/// Prior standard deviations of ln S and b around the fit. The linearisation at the fit is valid within a factor e of
+/// S, and over the ratios b of two lags in series.
 const SCALES: [f64; 2] = [1.0, 0.15];
 /// Steps of Levenberg–Marquardt.
 const STEPS: usize = 40;

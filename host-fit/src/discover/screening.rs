@@ -134,7 +134,8 @@ fn points(mut weighted: Vec<(f64, f64)>) -> Option<(Vec<f64>, usize)> {
     Some((x, nearest))
 }
 
-/// Reduction of the model's own delay for a term, s: room for a delay that shrinks.
+/// Time by which the model's own delay is shortened for a term of the delay, s, so that the term
+/// can also shorten the delay.
 pub(super) fn room(entry: Entry, model: &Model) -> f64 {
     match entry {
         Entry::Delay => {

@@ -39,7 +39,8 @@ pub(super) struct Term {
     pub(super) fading: Option<[f64; 2]>,
     /// Above this level the command counts as on.
     pub(super) on: f64,
-    /// Reduction of the model's own delay, s: room for a delay that shrinks.
+    /// Time by which the model's own delay is shortened, s, so that the term can also shorten the
+    /// delay.
     pub(super) shift: f64,
     /// Inner unit of time, s.
     pub(super) time: f64,

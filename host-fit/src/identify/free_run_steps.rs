@@ -144,7 +144,8 @@ fn lag_in(delays: &Delays, slot: Slot) -> u16 {
     list.get(slot.index).copied().unwrap_or(1)
 }
 
-/// The deepest local minima over the lag of the predicted ε in a slot, below a threshold.
+/// The deepest local minima of the predicted ε over the lag of a slot, if they are below a
+/// threshold.
 fn predicted_minima(
     problem: &FreeRun,
     linearised: &mut Linearised,

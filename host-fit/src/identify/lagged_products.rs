@@ -110,7 +110,8 @@ impl LaggedOutputs {
         // Row i belongs to y_{k+1−i}, the element with index 1 + i.
         let shifts = self.size - 1;
         let (mut first_row, mut first_sum) = (vec![0.0; shifts], 0.0);
-        // For each end: the outputs y_{n−i} from i = 0 on, newest last, and its sign.
+        // For each end of an interval: the outputs y_{n−i} from i = 0 on, newest last, and its
+        // sign.
         let mut ends: Vec<(&[f64], f64)> = Vec::new();
         for (padded, intervals) in self.padded.iter().zip(intervals) {
             for &(start, end) in intervals {

@@ -27,7 +27,7 @@ fn tables_needed(inputs: usize) -> usize {
 /// Whether there is memory for the tables that candidates of `structure` need.
 ///
 /// # Errors
-/// [`TooMuch`] with what they take.
+/// [`TooMuch`] with the memory that they need.
 pub(crate) fn fits_in_memory(structure: &Structure) -> Result<(), TooMuch> {
     let tables = tables_needed(structure.inputs) as u64 + TABLES_BESIDE;
     let needed = tables * table_bytes(structure.longest_lag.into());
@@ -313,7 +313,8 @@ impl Regression {
         }
     }
 
-    /// Adds the samples by which `to` differs from `from` (from nothing, if not given).
+    /// Adds the samples by which `to` differs from `from` (all samples of `to` if `from` is not
+    /// given).
     fn correct(
         &self,
         normal: &mut Normal,

@@ -330,7 +330,7 @@ fn distance(pair: &[(f64, f64)]) -> f64 {
     }
 }
 
-/// A coordinate in tenths of a pixel; invalid numbers go to the edge of a large sheet.
+/// A coordinate, rounded to a tenth of a pixel and limited to ± 100 000 pixels; 0 for NaN.
 fn pixel(v: f64) -> f64 {
     let v = if v.is_nan() { 0.0 } else { v };
     (v.clamp(-1e5, 1e5) * 10.0).round() / 10.0

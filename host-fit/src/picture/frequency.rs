@@ -147,7 +147,8 @@ pub fn frequency(plot: &FrequencyPlot<'_>) -> Picture {
     })
 }
 
-/// Lowest and highest value of a panel, at most `depth` apart. Limits count only as far as a tenth of `depth` beyond.
+/// Lowest and highest value of a panel, at most `depth` apart. The limits of measured points widen this range by at
+/// most a tenth of `depth` at each end.
 fn range(curves: &[Vec<(f64, f64)>], measured: &[Measured], depth: f64) -> Option<(f64, f64)> {
     let values = curves.iter().flatten().map(|point| point.1);
     let (low, high) = extent(values.chain(measured.iter().map(|point| point.1)))?;

@@ -19,9 +19,9 @@ use crate::simulate::SimulateError;
 use model_core::effects::{ConstantDelay, SaturatingDelay};
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Level of y, in inner units, above which a separate delay of the attached flow is tried …
+/// Level of y, in inner units, above which a separate delay of the attached flow is tried.
 const LEVEL: f64 = 0.6;
-/// … and the least difference between that delay and the delay at rest, samples.
+/// Least difference between the delay of the attached flow and the delay at rest, samples.
 const LEAST_RISE: f64 = 4.0;
 
 /// Averaging times of y that are tried with a delay law in addition to that of eq. (1), samples. A flow that

@@ -59,7 +59,8 @@ impl HeldOut {
     }
 }
 
-/// One-sided p-value of "`better` has the smaller validation error than `worse`".
+/// One-sided p-value of the null hypothesis that the validation error of `better` is not smaller than that of
+/// `worse`.
 ///
 /// With d the difference of the two runs and m the mean of their errors, the gain Σ e² − Σ e'² is 2 Σ m·d. It is
 /// positive if the regression of m on d has a positive slope. The test is Student's t test on that slope. The
@@ -96,7 +97,8 @@ fn last_of_both<'a>(a: &'a [f64], b: &'a [f64]) -> (&'a [f64], &'a [f64]) {
     (&a[a.len() - n..], &b[b.len() - n..])
 }
 
-/// p-value of "Σ e² exceeds `margin` times Σ σ²" over blocks; σ² per sample in the shape of the errors.
+/// p-value of the null hypothesis that Σ e² does not exceed `margin` times Σ σ², over blocks; σ² per
+/// sample in the shape of the errors.
 pub(crate) fn p_above_noise(held_out: &HeldOut, variance: &[Vec<f64>], margin: f64) -> f64 {
     let block = held_out.block;
     let mut excess = Vec::new();

@@ -1,5 +1,5 @@
-//! Counts the instructions of one step of Table II's model in model-core, in C by hand and in the
-//! exported C, in one run. Sends nine numbers over the serial line and stops.
+//! Counts the instructions of one step of Table II's model in model-core, in hand-written C and in
+//! the exported C, in one run. Sends nine numbers over the serial line and stops.
 #![no_std]
 #![no_main]
 

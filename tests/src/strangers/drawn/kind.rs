@@ -427,7 +427,7 @@ fn ringing(rng: &mut ChaCha8Rng) -> Drawn {
     drawn
 }
 
-/// The lag is that of the valve.
+/// An integrator behind a valve with a lag.
 fn integrating(rng: &mut ChaCha8Rng) -> Drawn {
     let mut rig = Rig::draw(rng);
     let u = rig.switched(rng, 0.0, 2.0);

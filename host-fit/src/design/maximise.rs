@@ -111,7 +111,8 @@ pub struct Weighed {
 /// The best pulses.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct BestPulses {
-    /// Mean friction of the pulses, the lowest with a period 2 % off, y.
+    /// Mean friction of the pulses, y: the lowest of the means with the period itself and with
+    /// periods 2 % shorter and longer.
     pub mean: f64,
     /// Share of time with the valve open.
     pub duty: f64,

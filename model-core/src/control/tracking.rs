@@ -559,8 +559,8 @@ mod tests {
         assert!(switches <= 400 + 12, "{switches}");
     }
 
-    /// Changed in operation: the share of time with the valve open falls to the new budget, and invalid values change
-    /// nothing.
+    /// The air budget is changed in operation. The share of time with the valve open must fall to the new budget, and
+    /// invalid values must change nothing.
     #[test]
     fn the_air_budget_changes_in_operation() {
         let mut law = law::<f64>(0.8, 10);

@@ -111,7 +111,7 @@ const STEPS: &[Step] = &[
         .within(Room::Firmware),
     Step::new("msrv", crate::msrv::msrv),
     Step::new("supply", crate::supply::supply),
-    // Every crate can be published.
+    // Checks that every crate can be published.
     Step::new("package", || (crate::package::TASK.run)(&[]))
         .after(&[BUILD])
         .within(Room::Host),

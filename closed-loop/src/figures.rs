@@ -75,7 +75,8 @@ fn settling(trace: &Trace) -> Option<f64> {
             openings.push(k);
         }
         was_on = sample.on;
-        // The ripple has no mean over whole cycles of the valve.
+        // The mean is taken over whole cycles of the valve, so that the ripple does not influence
+        // it.
         let cycles = openings.split_last().and_then(|(last, earlier)| {
             let first = earlier.iter().rev().find(|first| **first + mean <= *last)?;
             (k < first + CYCLES_OF * mean).then_some([*first, *last])

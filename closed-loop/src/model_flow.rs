@@ -48,8 +48,8 @@ impl<T: Real, M: Parts<T>, Y: Memory<T>, J: Memory<T>> Controlled for ModelFlow<
     fn sample_period_s(&self) -> f64 {
         self.sample_period_s
     }
-    /// The reading belongs to the sample in which the command acts: sensor effects of the model are one
-    /// sample old.
+    /// The reading is that of the next sample, in which the command has acted. The contribution of the
+    /// sensor effects is that of the present sample.
     fn step(&mut self, command: bool) -> Option<f64> {
         let input = Input {
             command: if command { T::ONE } else { T::ZERO },

@@ -124,7 +124,7 @@ impl Controller for PulseWidth {
     }
     fn command(&mut self, reading: Option<f64>) -> bool {
         if let Some(y) = reading {
-            // Averaged over the carrier period, to avoid aliasing of its ripple.
+            // The reading is averaged over the carrier period, to avoid aliasing of its ripple.
             self.reading += (y - self.reading) * 2.0 / f64::from(self.carrier + 1);
         }
         if self.at == 0 {

@@ -24,10 +24,10 @@ pub struct HiddenSetPlan {
 }
 
 impl HiddenSetPlan {
-    /// A random rig hiding the named effects and faults (without any: the null case).
+    /// A random rig with the named effects and faults hidden; without names, the null case.
     ///
     /// The base plant has a state-dependent delay, unless a hidden effect sets the delay. The free stream varies if
-    /// an effect needs it, and in a quarter of the other cases without influence.
+    /// an effect needs it. In a quarter of the other cases it varies too, without influence on the readings.
     ///
     /// # Errors
     /// [`RigError`] for unknown names and for effects that exclude each other.

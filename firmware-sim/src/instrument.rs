@@ -38,7 +38,7 @@ impl Converter {
     pub fn code(&self, y: f64) -> u32 {
         let top = f64::from((1_u32 << self.bits.clamp(1, 24)) - 1);
         let scaled = (y - self.low) / (self.high - self.low) * top;
-        // A saturating cast: the code stays at the end of its range.
+        // The cast saturates: the code stays at the end of its range.
         scaled.round().clamp(0.0, top) as u32
     }
 

@@ -217,7 +217,8 @@ mod tests {
         for (a, b) in loud.records.iter().zip(&quiet.records) {
             assert!(a.u[RUN_SAMPLES - TAIL_SAMPLES..].iter().all(|u| *u == 0.0));
             let off: Vec<f64> = a.y.iter().zip(&b.y).map(|(p, q)| p - q).collect();
-            // The sine alone has 0.021; process noise is amplified by the nearly integrating model.
+            // The sine alone has an rms of 0.021; process noise is amplified by the nearly
+            // integrating model.
             assert!(
                 (0.021..0.08).contains(&rms(&off)),
                 "{}: {}",

@@ -84,7 +84,7 @@ impl Session<'_> {
         let (mut records, mut noise_free) = (Vec::new(), Vec::new());
         for (index, (command, role)) in commands.into_iter().enumerate() {
             let n = command.levels.len();
-            // The unrecorded time before a record that begins in mid-run.
+            // A record that begins in mid-run is preceded by unrecorded samples.
             let lead = self.nuisances.lead_samples;
             let mut levels = Vec::with_capacity(lead + n);
             let mut u = command.levels;

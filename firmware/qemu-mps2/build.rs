@@ -1,4 +1,4 @@
-//! Puts the memory map where the linker looks for it, and the log's sections.
+//! Provides the memory map and the log's sections to the linker.
 
 fn main() {
     let out = std::env::var("OUT_DIR").unwrap_or_default();

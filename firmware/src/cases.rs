@@ -27,7 +27,7 @@ pub const fn settings(references: &[f32], period_s: f32) -> Settings {
     };
     Settings {
         channel,
-        // The plant differs from the models: no residual limit.
+        // There is no residual limit, because the plant differs from the models.
         residual_envelope: f32::INFINITY,
         ..Settings::of_rig(period_s)
     }

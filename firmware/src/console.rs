@@ -172,7 +172,7 @@ impl Line {
     }
 
     fn integer(&mut self, mut value: u64) {
-        // Least significant digit first; a constant divisor cannot be 0.
+        // The least significant digit is written first.
         let mut digits = [b'0'; 20];
         let mut used = 0;
         for digit in &mut digits {

@@ -295,8 +295,8 @@ impl<L: Law> Controller<L> {
         self.last = y;
         // A non-finite reading must not enter the averages.
         let y = if y.is_finite() { y } else { 0.0 };
-        // A command may explore behaviour unknown to the model, so that the residual does not close the valve
-        // then.
+        // While a command is played, the residual does not close the valve, because a command may explore
+        // behaviour unknown to the model.
         let action = match self.mode {
             Mode::Armed => self.law.act(y, &channels),
             Mode::Playing => self.law.follow(self.demand, y, &channels),
@@ -306,7 +306,7 @@ impl<L: Law> Controller<L> {
         };
         self.strayed += (action.residual - self.strayed) * Self::SHARE;
         let strayed = self.strayed.abs();
-        // Written so that NaN counts as outside: a diverged model is detected.
+        // The condition is written so that NaN counts as outside: a diverged model is detected.
         let within = strayed <= self.settings.residual_envelope;
         self.open = action.open;
         if self.is_running() && !within {
@@ -432,7 +432,8 @@ mod tests {
         }
     }
 
-    /// The bundled rig: 4 ms of the valve, half a second of equal readings.
+    /// The bundled rig: the shortest time of its valve is 4 ms, and equal readings for half a
+    /// second mean a stuck sensor.
     #[test]
     fn the_rigs_times_are_kept_at_any_period() {
         for (period_s, hold, stuck_after) in [
@@ -492,7 +493,7 @@ mod tests {
             let ticks = (0..900).map(|k| tick(controller, k, channel));
             ticks.map(|tick| tick.predicted).fold(0.0, f32::max)
         };
-        // 20 and 25 °C: the warm film reads less.
+        // The temperatures are 20 and 25 °C; the warm film reads less.
         let (at_20, at_25) = (run(&mut cold, 2000.0), run(&mut warm, 2500.0));
         assert!(at_20 > 0.1 && at_25 < 0.95 * at_20, "{at_20} {at_25}");
         let ill = tick(&mut cold, 0, f32::NAN);
@@ -504,7 +505,7 @@ mod tests {
         );
     }
 
-    /// 49 days at 1 kHz: the loop must run on past 2³² samples.
+    /// 2³² samples are 49 days at 1 kHz; the loop must continue after them.
     #[test]
     fn time_goes_on_beyond_32_bits() {
         let mut near = controller();

@@ -143,7 +143,7 @@ mod tests {
         assert!((sum - model::LAW.reference).abs() < 0.02, "{sum}");
     }
 
-    /// Changed in operation: bounded, and nonsense closes the valve.
+    /// A running law accepts changes within their bounds; an invalid value closes the valve.
     #[test]
     fn a_running_law_takes_what_is_within_bounds_and_stops_at_nonsense() {
         let mut controller = controller();
@@ -198,7 +198,7 @@ mod tests {
             assert!(!controller.is_open());
             run(&mut controller, 100);
             assert!(!controller.is_open());
-            // The faulted law cannot be changed back to life.
+            // No change of a setting can restart the faulted law.
             assert_eq!(controller.change(target), Err(Unchanged::NotRunning));
             controller.disarm();
             assert_eq!(controller.law_settings(), designed);

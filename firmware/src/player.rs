@@ -112,7 +112,8 @@ impl Player {
                 };
                 let between = lead.saturating_add(tail);
                 if between == 0 {
-                    // The valve is open at the end and at the start: both runs form one.
+                    // If the valve is open at the end and at the start of the command, both runs
+                    // form one.
                     continue;
                 }
                 between

@@ -40,7 +40,7 @@ where
 {
     /// Closes the valves and waits for the operator.
     pub fn new(controller: Controller<L>, sensor: S, clock: C, mut valve: V, mut lamp: A) -> Self {
-        // Pins of a microcontroller do not fail; a pin that fails is set again at the next sample.
+        // Pins of a microcontroller do not fail, and each pin is set again at the next sample.
         let _ = valve.set_low();
         let _ = lamp.set_low();
         let last = clock.periods();
@@ -68,7 +68,7 @@ where
     #[inline]
     pub fn sample(&mut self) -> Tick {
         let now = self.clock.periods();
-        // Correct also when the count wraps.
+        // The difference is correct also when the count wraps.
         let periods = now.wrapping_sub(self.last).max(1);
         self.last = now;
         let counts = self.sensor.counts();

@@ -195,7 +195,8 @@ impl<const N: usize> Real for Dual<N> {
     }
     #[inline(always)]
     fn two_sum(self, term: Self) -> (Self, Self) {
-        // Derivatives are not summed over long times, so their rounding is not compensated.
+        // Derivatives are not summed over long times, so the rounding errors of derivatives are not
+        // compensated.
         let (_, error) = self.lanes[0].two_sum(term.lanes[0]);
         (self + term, Self::constant(error))
     }

@@ -10,7 +10,8 @@ use crate::linalg::symmetric_eigenvalues;
 use crate::rules;
 
 rules! {
-    /// Excitation: criteria for the commands of a data set, and when a remark is made.
+    /// Excitation: criteria for the commands of a data set, and limits beyond which a remark is
+    /// made.
     pub struct Rules in "excitation";
 
     /// Number of lags in the covariance.
@@ -257,7 +258,8 @@ pub fn check_excitation(set: &DataSet, demand: Demand) -> Result<Excitation, Exc
     let Some((first, any)) = records.first() else {
         return Err(ExcitationError::NoIdentifyRecord);
     };
-    // A record that starts with blowing has an edge against the zero history.
+    // A record that starts with blowing has an edge at its start, because the command before it
+    // counts as 0.
     let varies = |r: &Record| r.u.iter().any(|u| Some(u) != r.u.first());
     if !records.iter().any(|(_, r)| varies(r)) {
         return Err(ExcitationError::ConstantInput {
@@ -388,7 +390,7 @@ fn separated_lags(records: &[&Record], max_lag: usize) -> (usize, usize, f64) {
             }
         }
     }
-    // Without a decomposition no separation is claimed.
+    // If the decomposition fails, no lag counts as separated.
     let eigenvalues = symmetric_eigenvalues(&covariance, count).unwrap_or_default();
     let largest = eigenvalues.iter().copied().fold(0.0, f64::max);
     let smallest = eigenvalues.iter().copied().fold(f64::INFINITY, f64::min);

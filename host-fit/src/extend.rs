@@ -1,7 +1,7 @@
 //! Addition of physical effects to a model: the search of a diagnosis with these effects in every model.
 //!
-//! A model without an effect imitates part of it by lags and base terms. They are therefore searched again with
-//! the effects, from the lowest order and from the given structure.
+//! A model without an effect imitates part of it by lags and base terms. Lags and base terms are therefore
+//! searched again with the effects, from the lowest order and from the given structure.
 
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -103,7 +103,7 @@ pub fn effects_for(model: &Model, names: &[String]) -> Result<Vec<&'static Spec>
 }
 
 /// Adds the effects `names` to `model`, and chooses lags and base terms again with them. Records are those of a
-/// diagnosis (see [`Model::targets`]), so that both give the same model.
+/// diagnosis (see [`Model::targets`]), so that `extend` and a diagnosis give the same model.
 ///
 /// # Errors
 /// [`ExtendError`]; a missing channel is named, not guessed. After an interrupt there is no result.
@@ -178,8 +178,8 @@ pub fn extend(
     })
 }
 
-/// `base` with all effects, refitted. The first of two effects may be fitted to imitate the second and stay there:
-/// both orders are tried.
+/// `base` with all effects, refitted. The effects are added one after the other. The first one may be fitted such
+/// that it imitates the second, so the reverse order is tried too.
 fn with_all(
     search: &Search<'_>,
     base: &Model,

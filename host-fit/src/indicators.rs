@@ -18,7 +18,7 @@ pub struct Indicators {
     pub samples: usize,
     /// ε = ‖x − x_simu‖₂, eq. (9), in y.
     pub epsilon: f64,
-    /// FIT, eq. (10), in percent; 100 is perfect, 0 is the mean.
+    /// FIT, eq. (10), in percent; 100 is a perfect fit, 0 is as good as the mean of y.
     pub fit_percent: f64,
     /// ρ, eq. (11), −1 to 1.
     pub correlation: f64,

@@ -164,7 +164,7 @@ struct Circumstances {
     noise: f64,
     lost: Lost,
     seed: u64,
-    /// The model's units, time included, in the simulator's.
+    /// Conversion between the units of the simulator and those of the model, time included.
     units: Units,
 }
 
@@ -317,7 +317,7 @@ mod tests {
     }
 
     fn proof_of(model: &Model, target: f64, seed: u64) -> Proof {
-        // Ten samples at any period.
+        // The shortest times are ten samples at any period.
         let shortest = 10.0 * model.sample_period_s;
         let request = TrackRequest {
             min_on_s: shortest,
@@ -374,7 +374,8 @@ mod tests {
         clock.model_out(&model)
     }
 
-    /// t → c·t: the law is the same, and its results are the same with all times multiplied by c.
+    /// If all times of the data are multiplied by c, the law is the same, and all times in its
+    /// results are multiplied by c.
     #[test]
     fn a_slower_clock_changes_times_and_nothing_else() {
         let near = |a: f64, b: f64| (a - b).abs() <= 1e-6 * a.abs().max(1e-3);

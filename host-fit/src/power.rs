@@ -2,11 +2,11 @@
 //! 80 % of cases.
 //!
 //! The amplitude is limited by what the base model can imitate. The part of the effect's change of the free run
-//! that the model's own parameters can follow is subtracted. So are further lags and unnamed terms, as long as each
-//! lowers the error by more than its parameters cost. The remaining part must exceed the practical margin and be
-//! significant over all candidates. A gain x²·‖z‖² has the standard deviation 2x·S, with S² = Σ (z·e)² over blocks
-//! longer than the correlation time of the error e. The threshold must be exceeded by 0.84 of this standard
-//! deviation.
+//! that the model's own parameters can follow is subtracted. Further lags and unnamed terms are subtracted too, as
+//! long as each lowers the error by more than the penalty of its parameters. The remaining part must exceed the
+//! practical margin and be significant over all candidates. A gain x²·‖z‖² has the standard deviation 2x·S, with S²
+//! = Σ (z·e)² over blocks longer than the correlation time of the error e. The threshold must be exceeded by 0.84
+//! of this standard deviation.
 
 use crate::data::Record;
 use crate::diagnose::RULES as NAMED;
@@ -53,7 +53,7 @@ pub struct Detectable {
     pub amplitude: Option<f64>,
     /// All parameters of the effect at that amplitude, in the order of its card.
     pub parameters: Vec<f64>,
-    /// The amplitude in words, which begin with those of the effect.
+    /// The amplitude in words, beginning with `subject`.
     pub words: String,
     /// The words of the effect.
     #[serde(skip)]
@@ -89,7 +89,7 @@ pub fn detectable(model: &Model, records: &[Record]) -> Result<Vec<Detectable>, 
 
 /// The threshold for naming an effect.
 struct Asked {
-    /// Standard deviations of the amplitude's estimate.
+    /// Least amplitude, in standard deviations of its estimate.
     deviations: f64,
     /// Threshold on the energy, as a share of the energy of the validation error.
     share: f64,
@@ -99,9 +99,10 @@ struct Asked {
 
 impl Asked {
     fn of(judge: &Judge, given: &Model, held_out: &HeldOut) -> Self {
-        // The effect must exceed the price of the test's level, of the number of models tried, and of the
-        // coefficients of the model without it, because all of these coefficients change to imitate the effect. An
-        // amplitude t standard deviations from 0 has an evidence of t²/2 nats, with standard deviation t.
+        // The evidence of the effect must exceed a penalty for the level of the test, for the number of models
+        // tried, and for the coefficients of the model without it, because all of these coefficients change to
+        // imitate the effect. An amplitude t standard deviations from 0 has an evidence of t²/2 nats, with
+        // standard deviation t.
         let likely = MostLikely::of(judge, given);
         let prior = likely.and_then(|likely| Some(likely.log_likelihood - likely.evidence(judge)?));
         let nats = prior.unwrap_or(0.0) - NAMED.level_of_search.ln() + (SPECS.len() as f64).ln();
@@ -109,7 +110,7 @@ impl Asked {
         // Amplitudes are estimated from all records.
         let all: usize = judge.scored_records().iter().map(Record::len).sum();
         let held_out_share = (held_out.samples as f64 / all.max(1) as f64).min(1.0);
-        // An error that is at the noise level already leaves nothing to detect.
+        // If the error is at the noise level already, no effect can be detected in it.
         let from_floor = (judge.over_noise(held_out.rmse()) / TERMS.at_the_floor).powi(2);
         let taken = (1.0 - from_floor).clamp(0.0, 0.99);
         Self {

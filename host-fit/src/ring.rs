@@ -75,7 +75,7 @@ mod tests {
         let (mut said, mut switch) = (0, 0u32);
         for k in 0..400_u32 {
             switch = switch.wrapping_mul(1_664_525).wrapping_add(k);
-            // Blowing with pulses of all lengths, and a valve that opens slowly.
+            // The jet has pulses of all lengths, and a valve that opens slowly.
             let value = match k / 100 {
                 0 | 1 => f64::from(k / (3 + k / 40) % 2),
                 2 => f64::from(switch >> 31),

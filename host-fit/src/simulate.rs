@@ -64,7 +64,7 @@ pub struct Signals<'a> {
     /// The command before the first sample, as fraction of a full jet. None: 0 for a model that starts from
     /// rest, the first value otherwise.
     pub u_before: Option<f64>,
-    /// y before the first sample; none: the first value.
+    /// y before the first sample. If it is unknown, the first value is used.
     pub y_before: Option<f64>,
     /// y of the first samples, which the run follows.
     pub followed: &'a [f64],
@@ -111,8 +111,8 @@ impl<'a> Signals<'a> {
         }
     }
 
-    /// Scale of the divergence limit: the range of the measured output and its distance from 0; without a
-    /// measurement, or if it is 0, `usual`.
+    /// Scale of the divergence limit: the range of the measured output and its distance from 0. Without a
+    /// measurement, or if the scale would be 0, it is `usual`.
     fn scale(&self, usual: f64) -> f64 {
         let largest = |y: &[f64]| y.iter().fold(0.0, |m: f64, y| m.max(y.abs()));
         let measured = self.y.map(largest).filter(|most| *most > 0.0);
@@ -195,7 +195,7 @@ impl<T: Real> Simulator<T> {
         if begins && first.is_none() {
             self.settle(signals, &mut state, &mut channels);
         }
-        // The samples before the record, with a constant command, run through the same loop.
+        // The samples before the record have a constant command and run through the same loop.
         let held = first.map_or(0, |_| self.samples_held());
         let (before, y) = first.unwrap_or((0.0, T::ZERO));
         let (before, y) = (std::iter::repeat_n(before, held), y - self.zero);
@@ -363,7 +363,7 @@ impl Simulator<f64> {
 fn memory(model: &Model) -> Footprint {
     match model.delay {
         Delay::Fixed { .. } => model.memory(),
-        // With room for the longer delays that a search of the law may try.
+        // The memory has room for the longer delays that a search of the law may try.
         Delay::Law(_) => model.memory_for(model.longest_delay().max(ROOM)),
     }
 }

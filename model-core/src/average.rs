@@ -1,8 +1,9 @@
 //! Moving averages without accumulating rounding errors.
 //!
-//! A running sum in floating point drifts without bound. Here the sum of every block of a window's length is
-//! computed anew and replaces the running one; both are stored in two words. After any number of samples the error
-//! is below that of summing the present window once, even after much larger values have left it.
+//! A running sum in floating point drifts without bound. Here a new sum is computed for every block of the
+//! window's length, and replaces the running sum at the end of the block. Both are stored in two words. After any
+//! number of samples the error is below that of summing the present window once, even after much larger values
+//! have left it.
 
 use crate::history::{DelayLine, Memory, Past};
 use crate::real::Real;
@@ -10,7 +11,7 @@ use crate::real::Real;
 /// Samples W of the averages in the paper, eqs. (1), (12) and (13).
 pub const WINDOW: u32 = 250;
 
-/// The sum of the last `terms` samples, sample by sample.
+/// Running sum of the last `terms` samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WindowSum<T> {
     running: TwoWords<T>,

@@ -77,7 +77,7 @@ pub const fn law(law: &Tracking<f32>) -> bool {
     law.lead > 0 && law.reference > law.reachable.low && law.reference < law.reachable.high
 }
 
-/// Samples that a tracking law looks ahead when the first arrival is `delay` away.
+/// Number of samples that a tracking law predicts if its command arrives after `delay` samples.
 #[must_use]
 pub const fn look_ahead<T>(law: &Tracking<T>, delay: usize) -> usize {
     let HoldTimes { on, off } = law.anticipation;

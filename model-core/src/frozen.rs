@@ -1,7 +1,7 @@
 //! Models whose constants are part of the code.
 //!
 //! A step reads some twenty lags and as many coefficients. If these are known at compile time, lags become offsets
-//! and coefficients immediates. The step then needs a third of the instructions of one that looks them up.
+//! and coefficients immediates. The step then needs a third of the instructions of a step that looks them up.
 
 use crate::effect::Effect;
 use crate::model::{Averaging, Parts};

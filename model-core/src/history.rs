@@ -163,7 +163,8 @@ impl<const WORDS: usize> BitHistory<WORDS> {
         if Self::SHIFTS {
             return (lag..lag + left).filter(|lag| self.is_on(*lag)).count() as u32;
         }
-        // Newest first, a word at a time: bits at and below `position`.
+        // Words are read from the newest to the oldest; of each word, the bits at and below
+        // `position`.
         let mut position = self.position(lag);
         let mut count = 0;
         while left > 0 {

@@ -548,7 +548,7 @@ mod tests {
         for _ in 0..60 {
             last = step(&model, &mut state, &input);
         }
-        // 61 samples later: the first jet has just arrived, from the time when the valve was starting to open.
+        // After 61 samples the first jet has just arrived. It was issued when the valve was starting to open.
         assert!(last.arrived > 0.0 && last.arrived < 0.2);
         for _ in 0..200 {
             last = step(&model, &mut state, &input);

@@ -1,4 +1,4 @@
-//! Table II of the paper, state-dependent delays: the model that tests run.
+//! The model with state-dependent delays of Table II of the paper, for tests.
 
 use crate::delay::ScaledDelay;
 use crate::effects::StateDependentDelay;

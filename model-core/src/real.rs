@@ -134,7 +134,7 @@ fn single_exp(x: f32) -> f32 {
     const LOWEST: f32 = -87.336_54;
     // Added to a number below 2²², it leaves the nearest integer in the low bits.
     const SHIFT: f32 = 12_582_912.0;
-    // ln 2 in two parts, the first with few digits: n times it is exact.
+    // ln 2 in two parts. The first part has few digits, so that n times it is exact.
     const LN_2: [f32; 2] = [0.693_359_4, -2.121_944_4e-4];
     const SERIES: [f32; 6] = [
         1.987_569_1e-4,
@@ -158,7 +158,7 @@ fn single_exp(x: f32) -> f32 {
         series = series * rest + *term;
     }
     let power = series * (rest * rest) + rest + 1.0;
-    // Times 2ⁿ: n is added to the exponent.
+    // Multiplies by 2ⁿ: n is added to the exponent.
     f32::from_bits(power.to_bits().wrapping_add(shifted.to_bits() << 23))
 }
 

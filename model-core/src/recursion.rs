@@ -15,7 +15,7 @@ pub enum LagConvention {
 }
 
 impl LagConvention {
-    /// How far behind the newest sample y_k the lag `tau` reads.
+    /// Number of samples between the newest sample y_k and the sample that the lag `tau` reads.
     #[inline]
     #[must_use]
     pub const fn behind_newest(self, tau: u16) -> usize {
@@ -72,8 +72,9 @@ impl Grading {
 ///
 /// with j_l the jet strength that arrives through input delay l (u_{k−h_l} if no effect shapes the command).
 /// For one input, jets of part strength and a [`Grading`] other than proportional, the flow relaxes with a
-/// rate between the separated and the attached flow's towards a level proportionally between theirs; terms
-/// with lags of [`SHORTEST_MEMORY`] and more are part of the level. On/off jets give the same result.
+/// rate between the separated and the attached flow's towards a level that lies between their levels in
+/// proportion to the jet; terms with lags of [`SHORTEST_MEMORY`] and more are part of the level. On/off jets
+/// give the same result.
 #[derive(Clone, Copy, Debug)]
 pub struct Bilinear<'a, T> {
     /// Meaning of the lags.
@@ -331,7 +332,7 @@ impl<T: Real> Bilinear<'_, T> {
     #[inline(always)]
     pub(crate) fn separated(&self, jet: T, rate: T) -> T {
         let share = self.grading.share(jet);
-        // On/off jets, and rates that cannot be divided.
+        // For on/off jets, and for a rate of 0, by which nothing can be divided.
         if share == T::ZERO || share == T::ONE || rate == T::ZERO {
             return T::ONE - share;
         }
@@ -397,10 +398,10 @@ mod tests {
             let [motion, released] = self::motion(grading, 1.0);
             assert!((motion - 0.05 * (0.8 - 0.3)).abs() < 1e-12 && released == 0.0);
         }
-        // Two flows in parallel, each with its part of the jet.
+        // The model is two parallel flows, each with its part of the jet.
         let [_, released] = self::motion(Grading::Proportional, 0.4);
         assert!((released + 0.6 * 0.02 * 0.3).abs() < 1e-12);
-        // One flow with an intermediate rate, 0.6 × 0.02 + 0.4 × 0.05.
+        // The model is one flow with an intermediate rate, 0.6 × 0.02 + 0.4 × 0.05.
         let [motion, released] = self::motion(Grading::Interpolated, 0.4);
         assert!((released - motion * 0.012 / 0.032).abs() < 1e-12);
         // Either flow.

@@ -75,8 +75,8 @@ pub struct Golden<const N: usize> {
     pub expected: [u32; N],
 }
 
-/// Whether the command of the reference run is on at sample `k`: blocks of 64 samples, half of them on, with single
-/// samples and longer runs.
+/// Whether the command of the reference run is on at sample `k`: the command is on in 18 of 32 blocks of 64
+/// samples, in single blocks and in runs of blocks.
 #[inline]
 #[must_use]
 pub const fn command(k: u32) -> bool {

@@ -339,7 +339,7 @@ mod tests {
                 }
             }
         }
-        // Half of the sequence is at rest.
+        // The command is off for half of the sequence.
         let mut rows = recording(20, 0.1, 8);
         for (k, row) in rows.iter_mut().enumerate() {
             row.on &= k % 200 < 100;
@@ -395,14 +395,14 @@ mod tests {
         let (record, summary) = run(&text(&rows), &later).unwrap();
         assert_eq!(summary.periods_used, 9);
         assert!((record.y[0] - response(35)).abs() < 1e-12);
-        // A second recording appended after 5.4 periods.
+        // A second recording is appended after 5.4 periods.
         rows.truncate(540);
         rows.extend(recording(4, 0.0, 4));
         let (record, summary) = run(&text(&rows), &Averaging::over(0.1)).unwrap();
         assert_eq!(summary.periods_used, 9);
         assert_eq!(dropped(&summary, Defect::Restart), Some((1, 542)));
         assert!((record.y[35] - response(35)).abs() < 1e-12);
-        // No edge at all: natural flow.
+        // The command has no edge: natural flow.
         rows.iter_mut().for_each(|r| r.on = false);
         let (record, summary) = run(&text(&rows), &Averaging::over(0.1)).unwrap();
         assert!(!summary.aligned_on_edges && record.u.iter().all(|&u| u == 0.0));

@@ -265,7 +265,7 @@ pub enum DataProblem {
         /// The sampling period.
         period: f64,
     },
-    /// The sampling periods from the times and as stated differ.
+    /// The sampling period of the time column differs from the stated one.
     #[error(
         "the times of the rows are {found} s apart, but {by} {stated} s; correct the value that is wrong"
     )]

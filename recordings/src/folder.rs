@@ -42,7 +42,7 @@ struct Entry {
     file: String,
     #[serde(rename = "use")]
     role: Use,
-    /// Command before the first sample; its first value if omitted.
+    /// Command before the first sample; the first value of u if omitted.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     u_before: Option<f64>,
     /// Number of unscored samples at the start.

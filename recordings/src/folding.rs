@@ -19,7 +19,7 @@ struct Waiting {
 /// The state of an average: the samples of the running period and the sums of the complete ones.
 #[derive(Debug)]
 pub(super) struct Folding {
-    /// Exact samples per period; the buffer works with whole ones.
+    /// Exact number of samples per period; the buffer works with the rounded number.
     exact_length: f64,
     length: usize,
     width: usize,
@@ -344,7 +344,7 @@ impl Folding {
                 left_over = self.waiting.len() - start - self.length;
             }
         }
-        // The first of equally frequent ones, for a unique result.
+        // Of equally frequent sequences the first is used, so that the result is unique.
         let most = self.sequences.iter().map(|s| s.periods).max().unwrap_or(0);
         let rule = self.sequences.iter().position(|s| s.periods == most);
         let Some(rule) = rule else {

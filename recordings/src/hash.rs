@@ -2,8 +2,8 @@
 //!
 //! FNV-1a, 64 bits, over the sampling period and the records. Each record contributes its name, its use, t0, and
 //! every column's name and values as IEEE 754 bits (little-endian), each string and column preceded by its length.
-//! If stated, the command before the record and its lead contribute too. The title does not. The hash distinguishes
-//! data sets; it does not protect against deliberate collisions.
+//! If stated, the command before the record and its lead contribute too. The title does not contribute. The hash
+//! distinguishes data sets; it does not protect against deliberate collisions.
 
 use crate::record::{Record, Use};
 

@@ -110,7 +110,7 @@ fn target(path: &Path) -> Result<PathBuf, OutputError> {
     Ok(target)
 }
 
-/// An empty file next to `target`, which is removed with the value.
+/// An empty file next to `target`, which is deleted when the returned value is dropped.
 fn temporary(target: &Path) -> io::Result<tempfile::NamedTempFile> {
     permitted(tempfile::Builder::new().prefix(".host-fit-"), 0o666)
         .tempfile_in(parent_of(target))
@@ -444,7 +444,7 @@ mod tests {
                     // A folder that is in use stays unchanged.
                     let names = ["dataset.toml", "a.csv", "b.csv", "dataset.toml"];
                     let read = names.map(|n| fs::read(target.join(n)).unwrap_or_default());
-                    // Counted only if nothing was exchanged while reading.
+                    // A read counts only if the folders were not exchanged during it.
                     if read[0] == read[3] && !read[0].is_empty() {
                         seen += 1;
                         mixed += u32::from(read[1] != read[0] || read[2] != read[0]);

@@ -387,7 +387,8 @@ mod tests {
         assert_eq!(of(command.clone()), Some(60));
         command[10] = 0.5;
         assert_eq!(of(command.clone()), Some(10));
-        // A staircase, a relay between other levels, a short command with one wrong value.
+        // The commands are a staircase, a relay between other levels, and a short command with one
+        // wrong value.
         let levels = (0..200).map(|k| f64::from(k / 20) / 9.0).collect();
         assert_eq!(of(levels), None);
         assert_eq!(of(vec![0.0, 0.0, 2.0, 0.0]), None);

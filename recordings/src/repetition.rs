@@ -102,7 +102,7 @@ mod tests {
         // One of twenty pulses is missing.
         let gapped = |k: u64| k % 50 < 20 && k % 1000 > 50;
         assert_eq!(edges(5000, gapped).repeat(1), Some(1000));
-        // A clock drift of half a sample per repeat, and one wrong sample.
+        // The clock drifts by half a sample per repeat, and one sample is wrong.
         let drifting = |k: u64| two_pulses((k as f64 / 1.005) as u64) ^ (k == 512);
         let found = edges(2000, drifting).repeat(1).unwrap();
         assert!((100..=101).contains(&found), "{found}");

@@ -86,7 +86,7 @@ impl PrintedTimes {
 
     /// Whether times k·period + offset, rounded like the printed ones, reproduce all printed times. In addition each
     /// time may deviate by the allowance for uneven steps. A few uncommon steps are evidence of rounding only if the
-    /// clock counts whole seconds; a repeated time of such a clock is not.
+    /// clock counts whole seconds; a repeated time of such a clock is not evidence of rounding.
     fn rounded(&self) -> Option<Rounded> {
         let last = self.time.len().checked_sub(1).filter(|&n| n >= 2)?;
         let unit = self.resolution();
@@ -137,8 +137,8 @@ impl PrintedTimes {
     }
 
     /// The time over which the mean step is computed, s, and its number of steps. If times repeat, the span extends
-    /// from one change of the printed time to another. A change is known to within a step; other times are known to
-    /// within the printed unit only.
+    /// from one change of the printed time to another. The time of a change is known to within one step; other
+    /// times are known only to within the printed unit.
     pub(crate) fn span(&self) -> (f64, usize) {
         let changes =
             || (1..self.time.len()).filter(|&row| self.time.get(row) > self.time.get(row - 1));
@@ -171,7 +171,8 @@ impl PrintedTimes {
         let middle = sorted.len() / 2;
         let median = *sorted.select_nth_unstable_by(middle, f64::total_cmp).1;
         let rounding = |row: usize| self.unit[row - 1].max(self.unit[row]);
-        // The mean of the regular steps: the median is rounded like the printed times.
+        // The mean of the regular steps is used, because the median is rounded like the printed
+        // times.
         let regular = (1..).zip(&steps);
         let regular = regular
             .filter(|&(row, s)| (s - median).abs() <= tolerance(median, rounding(row)))
@@ -211,7 +212,8 @@ impl PrintedTimes {
         let middle = steps.len() / 2;
         let median = *steps.select_nth_unstable_by(middle, f64::total_cmp).1;
         let rounding = |row: usize| self.unit[row - 1].max(self.unit[row]);
-        // A period that fits no step is a wrong statement, not a gap in row 2.
+        // If the stated period fits no step, the statement is wrong; the error must not report a
+        // gap in row 2.
         if let Some(stated) = stated
             && (median - stated.period_s).abs() > tolerance(stated.period_s, rounding(1))
         {
@@ -407,11 +409,13 @@ mod tests {
             let lost = times.lost_rows(stated).unwrap_or_default();
             (0..).zip(lost).filter(|(_, lost)| *lost > 0.0).collect()
         };
-        // 9.9 ms in whole milliseconds: a long gap is not counted in median steps of 10 ms.
+        // At a period of 9.9 ms printed in whole milliseconds, the median step is 10 ms; a long gap
+        // must not be counted in such steps.
         let long: Vec<usize> = (200..320).collect();
         let times = without(printed(1000, 0.0099, 3), &[&[40, 41], &long[..]].concat());
         assert_eq!(found(&times, None), [(40, 2.0), (198, 120.0)]);
-        // A clock of whole seconds: a single missing second is a lost row, several are rounding.
+        // For a clock of whole seconds, a single missing second is a lost row; several missing
+        // seconds are due to rounding.
         let times = without(whole(600, 1.0, 1.0, 0.0), &[300]);
         assert_eq!(found(&times, None), [(300, 1.0)]);
         assert_eq!(found(&whole(600, 1.01, 1.0, 0.0), None), []);

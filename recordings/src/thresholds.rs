@@ -17,7 +17,8 @@ crate::rules! {
     /// Times printed in a finer unit count as rounded only if at least this many steps differ from the most
     /// common one.
     jumps: usize = 3, "steps", "judgement: one or two different steps are missing or repeated rows";
-    /// Records of one data set may have periods that differ by less than this over the longest of them.
+    /// The periods of the records of one data set may differ, if their sample times differ by less than
+    /// this at the end of the longest record.
     drift: f64 = 1.0, "samples", "convention: no sample is shifted onto another";
     /// A column `t` with a larger value is not in seconds.
     latest_s: f64 = 1e11, "s", "3000 years; a Unix time in ms is beyond it, one in s is not";

@@ -127,7 +127,8 @@ fn serial_monitors_are_read() {
         (Some("out"), Some("pv"))
     );
 
-    // The monitor's own clock before each line, a start-up message, a line that was cut off.
+    // The text has the monitor's own clock before each line, a start-up message, and a line that
+    // was cut off.
     let lines: String = (0..40)
         .map(|k| {
             format!(
@@ -354,7 +355,8 @@ fn short_gaps_are_filled_and_long_ones_named() {
     };
     let whole = filled(0.3, &[]).unwrap();
     assert!(whole.files[0].remarks.is_empty());
-    // Two lost rows, a value that is missing beside them, marks in u and in a channel.
+    // The file has two lost rows, a value that is missing beside them, and marks for missing values
+    // in u and in a channel.
     let lost = [(3, "0.3,NaN,6,5\n"), (6, ""), (7, ""), (12, "1.2,0,,n/a\n")];
     let found = filled(0.3, &lost).unwrap();
     let (record, all) = (&found.set.records[0], &whole.set.records[0]);
@@ -445,7 +447,7 @@ fn a_command_may_be_graded_held_or_in_percent() {
     let kept = kept.unwrap();
     assert_eq!(kept.set.records[0].u, [0.0, 45.0, 45.0]);
     assert_eq!(kept.set.records[0].u_before, Some(0.0));
-    // The command as the last column, written on change only.
+    // The command is the last column and is written on change only.
     let last = parsed("t,y,u\n0,21,open\n1,21,\n2,22,closed\n3,22,\n");
     assert_eq!(last.set.records[0].u, [1.0, 1.0, 0.0, 0.0]);
     let german = parsed("Uhrzeit;Ventil;Sensor\n10:00:00;auf;1.021,5\n10:00:01;zu;998,25\n");

@@ -208,7 +208,8 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
     use rand_distr::{Distribution, StandardNormal};
 
-    /// White 0.03 and coloured 0.035 over 20 ms: a hot film.
+    /// Simulated noise of a hot film: white with s.d. 0.03, plus coloured with s.d. 0.035 and a
+    /// correlation time of 20 ms.
     struct Film {
         coloured: f64,
         rng: ChaCha8Rng,
@@ -258,7 +259,7 @@ mod tests {
             }
             alarm
         });
-        // At most 30 expected; 3 standard deviations above.
+        // At most 30 alarms are expected; 45 is 3 standard deviations above.
         assert!((4..=45).contains(&count), "{count} of 150");
     }
 
@@ -296,7 +297,7 @@ mod tests {
             "{:?}",
             alarm.verdict()
         );
-        // A change by a twentieth of the range, invisible in a single sample.
+        // The mean changes by a twentieth of the range, which is invisible in a single sample.
         for _ in 0..5_000 {
             alarm.push(0.05 + film.sample());
         }

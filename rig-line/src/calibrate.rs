@@ -122,7 +122,7 @@ pub fn calibrate(
         played(host, &command, &mut |progress| watch(what, progress))
     };
     let shut = play("valve shut", vec![false; steady])?;
-    // Open, then closed for the same time, so that the next test starts at rest.
+    // The valve is opened, then closed for the same time, so that the next test starts at rest.
     let blown = play(
         "valve open",
         [vec![true; steady], vec![false; steady]].concat(),
@@ -222,7 +222,7 @@ fn shortest(
         let text = format!("{what} of {:.0} ms", length as f64 * period * 1e3);
         let counts = match play(&text, levels) {
             Ok(counts) => counts,
-            // Shorter than the board's hold times.
+            // The pulse is shorter than the board's hold times.
             Err(LineError::Refused { reason, .. }) if reason.contains("hold time") => {
                 return Ok(false);
             }
@@ -231,7 +231,7 @@ fn shortest(
         let answers: Vec<f64> = (0..plan.pulses as usize)
             .filter_map(|n| {
                 let edge = lead + n * (rest + length) + rest;
-                // The level before the pulse, and the extreme after it.
+                // Mean level before the pulse, and extreme reading after it.
                 let before = mean(counts.get(edge - rest / 4..edge)?);
                 let after = mean(counts.get(edge + 20.min(rest / 8)..edge + rest / 2)?);
                 Some((after - before) * if open { swing } else { -swing } / swing.abs())

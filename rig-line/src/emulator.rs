@@ -1,8 +1,8 @@
 //! A board under QEMU with a simulated rig, so that the whole workflow runs without hardware.
 //!
-//! QEMU's first serial line is the host's; its second carries readings and valve (`qemu-rig` of the firmware). The
-//! rig is the sample clock. It samples as fast as board and host permit, but no further ahead of the host than a
-//! real board would be, unless the host has stopped.
+//! The first serial line of QEMU connects the board to the host. The second carries the readings and the state of
+//! the valve (`qemu-rig` of the firmware). The rig is the sample clock. It samples as fast as the board and the
+//! host permit, but it is never further ahead of the host than a real board would be, unless the host has stopped.
 
 use std::io::{Read, Write};
 use std::net::TcpListener;

@@ -20,7 +20,7 @@ pub enum LineError {
         /// Message of the operating system.
         cause: std::io::Error,
     },
-    /// Another program has the device.
+    /// Another program uses the device.
     #[error("{0} is in use by another program; a board accepts one host at a time")]
     InUse(String),
     /// The connection is lost.

@@ -270,7 +270,7 @@ impl Host {
             }
             Change::Air(share) => {
                 const ASKED: &str = "change its air budget";
-                // NaN becomes 0, which is outside.
+                // NaN becomes 0, which is outside the permitted range.
                 let per_mille = (share * f64::from(NO_LIMIT)).round() as u16;
                 if !Settings::takes_air(per_mille) {
                     return Err(LineError::Refused {
@@ -311,7 +311,7 @@ impl Host {
             };
             match status {
                 Status::Done => return Ok(samples),
-                // The other host may be gone and not yet released.
+                // The other host may have gone, and the board may still wait for it.
                 Status::Busy if Instant::now() < until => {
                     let _ = self.port.receive(ALIVE)?;
                     self.touch();

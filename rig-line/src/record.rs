@@ -321,7 +321,7 @@ impl Session<'_, '_> {
     fn take(&mut self, taken: &mut Taken, streamed: &Streamed) -> Result<(), LineError> {
         let first = streamed.samples.first().map_or(streamed.next, |(n, _)| *n);
         if first < taken.next {
-            // Received before, or of another turn.
+            // These samples were received before, or belong to another turn.
             return Ok(());
         }
         self.gap(taken, first, Some(streamed.left_out));

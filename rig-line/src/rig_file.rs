@@ -42,12 +42,13 @@ pub struct SensorEntry {
     pub lower_rail_counts: f64,
     /// Readings at or above this are at the upper rail, counts.
     pub upper_rail_counts: f64,
-    /// Equal readings in a row that mean a stuck sensor.
+    /// Number of equal readings in a row after which the sensor counts as stuck.
     pub stuck_after_samples: u32,
-    /// Standard deviation of the noise, counts: off, and under steady blowing.
+    /// Standard deviation of the noise, counts: with the valve closed, and under steady blowing.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub noise_counts: Option<[f64; 2]>,
-    /// Remaining noise in averages over 64 samples, counts, the larger of both; used by `design --rig`.
+    /// Standard deviation of the noise in averages over 64 samples, counts: the larger of the values
+    /// with the valve closed and under steady blowing. Used by `design --rig`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub slow_noise_counts: Option<f64>,
 }
@@ -195,7 +196,7 @@ impl RigFile {
                 channel.upper_rail_counts,
             )?;
             for (key, text) in [("name", &channel.name), ("unit", &channel.unit)] {
-                // It becomes the header of a column and a constant of the board.
+                // The name becomes a column header and a constant of the board.
                 let acts = |c: char| c.is_control() || matches!(c, ',' | '"');
                 if text.contains(acts)
                     || visible(text) != *text
@@ -241,7 +242,7 @@ impl RigFile {
     #[must_use]
     pub fn hold_samples(&self) -> [u32; 2] {
         [self.valve.shortest_on_s, self.valve.shortest_off_s]
-            // A thousandth of a sample is rounding in the file.
+            // A difference below a thousandth of a sample is rounding in the file.
             .map(|time| (time / self.sample_period_s - 1e-3).ceil().max(1.0) as u32)
     }
 

@@ -33,7 +33,7 @@ pub struct Plan {
     pub test: Test,
 }
 
-/// A moment of the loop.
+/// State of the closed loop at one sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Now {
     /// Time, s.
@@ -127,14 +127,15 @@ const SILENCE: Duration = Duration::from_secs(2);
 const NOTHING_NEW: Duration = Duration::from_secs(10);
 /// Errors and air are computed from this time after arming on, s; before it the flow is far from y*.
 const SETTLING_S: f64 = 1.0;
-/// They also begin only after this many samples, because flows are slow at a long sample period.
+/// Errors and air are computed only after at least this many samples, because flows are slow at a
+/// long sample period.
 const SETTLING: u64 = 1000;
 
 /// Weight of a residual in the average that the board compares with its limit.
 const SHARE: f64 = 1.0 / 64.0;
 
-/// Watches the loop behind `host`, makes the changes that `turn` returns until it returns the end, and writes the log's
-/// folder, if requested.
+/// Watches the loop behind `host` and makes the changes that `turn` returns, until `turn` returns the end. Writes the
+/// log's folder, if requested.
 ///
 /// The board answers a change before the next one is requested. A refused change is recorded, and the loop
 /// continues unchanged.
@@ -307,7 +308,8 @@ impl Watcher {
         }
         self.phase = streamed.phase;
         let runs = streamed.phase == Phase::Armed;
-        // Another target is another operating point, with a transient and its own model error.
+        // With another target the operating point changes: there is a transient, and the model
+        // error is different.
         if runs && streamed.reference != self.reference {
             if self.reference.is_some() {
                 self.alarm.learn_again();

@@ -34,8 +34,8 @@ fn play(
     (result, kept)
 }
 
-/// Repeats are whole: the valve as commanded, and samples that follow each other
-/// (the channel counts them).
+/// Checks that repeats are complete: the valve moved as commanded, and the samples follow each
+/// other without a gap (the channel counts them).
 fn whole(command: &Command, kept: &[Vec<Sample>]) {
     for repeat in kept {
         assert!(command.levels().eq(repeat.iter().map(|s| s.open)));
@@ -175,7 +175,7 @@ fn a_host_that_dies_leaves_no_valve_open() {
         assert!(std::time::Instant::now() < until, "{samples} {open}");
     }
     let open = hands.open.load(Ordering::Relaxed);
-    // Half a second after the host was last heard.
+    // The valve closes half a second after the last message from the host.
     assert!((300..1000).contains(&open), "{open}");
 }
 
@@ -224,7 +224,7 @@ fn what_no_board_can_play_is_refused_with_the_reason() {
     assert!(refused(&mut host, &short).contains("hold time"));
     let long = Command::new("long", 0.001, (0..90_000).map(|k| k / 30 % 2 == 1));
     assert!(refused(&mut host, &long).contains("3000 runs"));
-    // A law on a flow that does not respond.
+    // The law runs on a flow that does not respond.
     host.arm().expect("armed");
     let message = refused(&mut host, &command(1000));
     assert!(
@@ -266,7 +266,8 @@ fn a_rig_without_air_or_at_a_rail_is_not_calibrated() {
     }
 }
 
-/// The law runs, then the sensor's zero moves: the log begins at rest, and the check of the model raises the alarm.
+/// The zero of the sensor moves while the law runs. The log must begin at rest, and the check of the model must
+/// raise the alarm.
 #[test]
 fn a_loop_is_watched_logged_and_judged() {
     use rig_line::alarm::{Test, Verdict};
@@ -294,7 +295,7 @@ fn a_loop_is_watched_logged_and_judged() {
         Some(&log),
         &mut |now| {
             if now.t > 40.0 {
-                // A fifth of the shift that latches a fault.
+                // The shift is a fifth of the shift that latches a fault.
                 hands.shift.store(200, Ordering::Relaxed);
             } else {
                 seen.push(now.verdict);

@@ -43,7 +43,7 @@ fn upgrade(stream: &mut TcpStream, port: &str, path: &str) -> Result<()> {
         "GET {path} HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n\
          Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: MDEyMzQ1Njc4OWFiY2RlZg==\r\n\r\n"
     )?;
-    // Exactly to the end of the header, because frames follow.
+    // Reads exactly to the end of the header, because frames follow.
     let mut answer = Vec::new();
     while !answer.ends_with(b"\r\n\r\n") {
         let mut byte = [0];
@@ -169,7 +169,7 @@ impl Browser {
         for domain in ["Runtime.enable", "Log.enable", "Page.enable"] {
             self.on(&page, domain, &json!({}))?;
         }
-        // Time of the page's own thread, independent of the machine's load.
+        // Measures the time of the page's own thread, which is independent of the machine's load.
         self.on(
             &page,
             "Performance.enable",

@@ -14,7 +14,8 @@ use std::ffi::OsStr;
 use std::path::PathBuf;
 use std::process::Command;
 
-/// Options of a `design` whose contract is tested, not its law: trials of half the length, and a coarse robustness margin.
+/// Options of `design` for tests of its messages and files, in which the quality of the law is irrelevant: trials of
+/// half the length, and a coarse robustness margin.
 pub const QUICK_DESIGN: &str = "--set design.trial=6000 --set design.trial-from=2000 --set design.margin-rays=4 \
      --set design.margin-bisections=2";
 
@@ -39,7 +40,8 @@ pub fn host_fit(line: &str, parts: Parts<'_>) -> Command {
     command
 }
 
-/// The file of a model with a first-order flow, a guess like one made by hand; `delay` are the keys of its delay.
+/// The file of a model with a first-order flow and guessed coefficients, as a user would write it by hand;
+/// `delay` are the keys of its delay.
 #[must_use]
 pub fn first_order(a: f64, b: f64, delay: &str) -> String {
     format!(

@@ -58,7 +58,8 @@ starts = [0.1]
     model.define(definition).expect("no other");
     model.add(definition.spec(), &[0.1], Some(10.0));
     model.effects[0].channel = Some(HOSTILE.to_owned());
-    // Compiled and run; text that escaped from a comment or string would not parse, or would end the run.
+    // The file is compiled and run. Text that escaped from a comment or string would not parse, or would
+    // end the run.
     let case = Case {
         name: "hostile".to_owned(),
         model: model.clone(),

@@ -21,7 +21,7 @@ fn dependencies(package: &str) -> BTreeSet<String> {
     names.filter(ours).collect()
 }
 
-/// From bottom to top, with the allowed dependencies of each.
+/// The crates from bottom to top, each with its allowed dependencies.
 const CRATES: [(&str, &[&str]); 8] = [
     ("model-core", &[]),
     ("wire", &["model-core"]),
@@ -32,8 +32,8 @@ const CRATES: [(&str, &[&str]); 8] = [
     ("firmware-sim", &["closed-loop", "recordings"]),
     (
         "host-fit",
-        // Simulator, line and workbench serve the program only: they are optional dependencies, see the CI step
-        // "library alone".
+        // Simulator, line and workbench are used by the program only, so they are optional dependencies; see
+        // the CI step "library alone".
         &[
             "closed-loop",
             "firmware-sim",

@@ -37,7 +37,7 @@ fn the_first_ten_minutes_print_what_the_page_says() {
             .expect("the program starts");
         let text = String::from_utf8(output.stdout).expect("UTF-8");
         assert!(output.status.success(), "{text}");
-        // The answer up to its next command.
+        // Compares the answer up to its next command.
         for line in text.lines() {
             assert!(page.contains(line), "`{line}` is not on the page");
             if line.starts_with("  Next:") {

@@ -16,8 +16,8 @@ fn names_parameters_units_and_channels_are_the_same() {
     assert_eq!(names, plants);
     for spec in SPECS {
         let effect = Effect::draw(spec.name, &base, &mut rng).expect("a plant's effect");
-        // A parameter that a model file may omit need not exist in the plant. It is the delay of the pickup: in the
-        // plant the command of a sample is set before the reading.
+        // A parameter that a model file may omit need not exist in the plant. This applies to the delay of the
+        // pickup, because in the plant the command of a sample is set before the reading.
         let stated = spec.parameters.iter().filter(|p| p.left_out.is_none());
         let model = stated.map(|p| (p.name, p.unit.to_string()));
         let plant = effect.parameters().into_iter();

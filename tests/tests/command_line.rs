@@ -132,7 +132,7 @@ fn compare_prints_the_indicators_of_the_contract() {
         keys(record, INDICATORS);
         assert!(record["noise_rmse"].is_null(), "no y_sd in this set");
     }
-    // ε² of the records add up; RMSE = ε/√n.
+    // The values ε² of the records add up, and RMSE = ε/√n.
     let of = |role: &str| {
         let all = records.iter().filter(|r| r["use"] == role);
         all.map(|r| number(&r["epsilon"]).powi(2))
@@ -221,7 +221,7 @@ fn a_comparison_leaves_a_page_and_pictures() {
     );
     let page = std::fs::read_to_string(page).expect("the page");
     assert!(page.starts_with("<!doctype html>") && page.contains("<svg"));
-    // It contains its own script and loads nothing from the network.
+    // The page contains its own script and loads nothing from the network.
     assert!(page.contains("Content-Security-Policy") && !page.contains("<script src"));
     assert_eq!(std::fs::read_dir(pictures).expect("pictures").count(), 8);
 }
@@ -505,8 +505,8 @@ fn paper_model(folder: &Path) -> PathBuf {
     path
 }
 
-/// At half the friction an unknown King's law costs attachment (docs/law.md). The records do not support it, so the
-/// law is written with a warning, and the constants do not mention it.
+/// At half the friction an unknown King's law causes a loss of attachment (docs/law.md). The records do not support
+/// it, so the law is written with a warning, and the constants do not mention it.
 #[test]
 fn stress_warns_and_refuses_nothing() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -23,7 +23,7 @@ fn parsed(text: &str) -> Value {
     serde_json::to_value(table).expect("JSON")
 }
 
-/// Whether `value` fits `schema`: the keywords that our schemas have.
+/// Whether `value` fits `schema`; only the keywords that our schemas contain are checked.
 fn fits(schema: &Value, value: &Value) -> bool {
     if let Some(choices) = schema["oneOf"].as_array() {
         return choices.iter().filter(|choice| fits(choice, value)).count() == 1;

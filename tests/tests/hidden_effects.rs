@@ -24,7 +24,8 @@ fn asked_of_all(case: &Case) -> Row {
 }
 
 fn asked_of(case: &Case, part: Option<Part>) -> Row {
-    // A limit for a search that never ends; other steps of CI may run at the same time.
+    // The time limit stops a search that never ends; it is long, because other steps of CI may run
+    // at the same time.
     let program = Program {
         part,
         ..Program::new(scenarios::program(), Duration::from_secs(900))
@@ -68,8 +69,8 @@ fn a_memory_of_the_flow_is_no_missing_effect() {
     is_found(&row);
 }
 
-/// The identified model alone is near the noise level: a wake with an unknown initial state, and a delay that
-/// shortens only up to a level.
+/// For two rigs the identified model is near the noise level without a hidden effect: a wake with an unknown
+/// initial state, and a delay that shortens only up to a level.
 #[test]
 #[ignore = "half a minute of processor time: cargo xtask kept-rigs"]
 fn the_default_model_comes_near_the_noise_in_mid_run_and_under_other_laws() {
@@ -78,7 +79,7 @@ fn the_default_model_comes_near_the_noise_in_mid_run_and_under_other_laws() {
         ..Case::new(Group::Nothing, Family::Wake, &[], 2_026_200_179)
     };
     let saturating = Case::new(Group::Nothing, Family::RateOfY, &[], 3_131_200_114);
-    // At 1.06 × the noise level something is unexplained, and it gets no name.
+    // At 1.06 × the noise level part of the error is unexplained, and no effect is named.
     for (case, verdict) in [(in_mid_run, "unexplained"), (saturating, "nothing-missing")] {
         let row = asked_of_all(&case);
         assert_eq!(row.verdict, verdict, "{case}");
@@ -115,8 +116,8 @@ fn graded_commands_below_a_full_jet_leave_nothing_to_name() {
     assert!(row.is_at_floor(), "{:?}", row.over_floor);
 }
 
-/// With its lag in the model, an echo of three per cent would imitate the second order of the valve; so does
-/// another lag of the flow.
+/// If the valve's lag is in the model, an echo of three per cent would imitate the second order of the
+/// valve, and so would another lag of the flow.
 #[test]
 #[ignore = "two minutes of two cores: cargo xtask kept-rigs"]
 fn a_valve_of_second_order_is_a_valve_and_no_echo() {
@@ -225,7 +226,7 @@ fn other_units_change_no_name_and_transform_the_parameters() {
     }
 }
 
-/// The paper's own step: a fixed-delay model of a flow with a state-dependent delay.
+/// The flow has a state-dependent delay and the model a fixed one. The paper made the same step.
 #[test]
 fn a_state_dependent_delay_is_the_first_hidden_effect() {
     let row = diagnosed(

@@ -263,8 +263,7 @@ fn names_are_shown_and_do_not_act() {
     }
 }
 
-/// Values of a rig file become constants in single precision. The data do not exist either: the first error shows
-/// that nothing was read before.
+/// The inputs do not exist: an error about the output shows that nothing was read before.
 #[test]
 fn an_output_that_cannot_be_written_is_refused_before_anything_is_read() {
     let room = Room::new();

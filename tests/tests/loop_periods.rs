@@ -1,4 +1,5 @@
-//! A law at any loop period: designed, its constants written; invalid periods are refused first.
+//! A law can be designed, and its constants written, for any valid loop period. Invalid periods are
+//! refused before the design.
 
 use std::path::Path;
 use std::process::Output;
@@ -83,7 +84,8 @@ fn what_is_no_loops_period_is_refused_before_anything_else() {
     let out = folder.path().join("c.toml").to_string_lossy().into_owned();
     for period_s in [0.0001, 0.25, 60.0] {
         paper_at(period_s).save(Path::new(&model)).expect("saved");
-        // The target, which cannot be held, and the rig file, which does not exist, are not checked before.
+        // The period is checked before the target, which cannot be held, and before the rig file, which
+        // does not exist.
         let output = run(
             "design {} -o {} --target 7 --rig none.toml",
             &[&model, &out],

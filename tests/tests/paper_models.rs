@@ -71,7 +71,8 @@ fn the_state_dependent_model_rises_as_the_theory_page_says() {
 #[test]
 fn which_reading_is_stable() {
     let minutes = vec![1.0; 240_000];
-    // Table II, state-dependent: one-step lags stay bounded for minutes, literal ones do not.
+    // Table II, state-dependent delay: the model is bounded for minutes with one-step lags, and
+    // unstable with literal lags.
     let mut state = model("table-2-state-dependent");
     let last = run(&state, &minutes).expect("bounded");
     let size = |y: &[f64]| y.iter().fold(0.0, |m: f64, y| m.max(y.abs()));
@@ -79,7 +80,8 @@ fn which_reading_is_stable() {
     state.convention = LagConvention::Literal;
     let literal = run(&state, &minutes);
     assert!(literal.is_err() || literal.is_ok_and(|y| size(&y) > 10.0));
-    // Table II, fixed: literal lags last 20 s, one-step lags do not.
+    // Table II, fixed delay: the model is bounded for 20 s with literal lags, but not with one-step
+    // lags.
     let mut fixed = model("table-2-fixed");
     let short = run(&fixed, &minutes[..20_000]).expect("bounded for 20 s");
     assert!(size(&short) < 1.3);
@@ -112,15 +114,15 @@ fn the_five_second_delay_stands_for_switching_off() {
         let y = run(&averaged, &on_then_off(on, 2_100)).expect("bounded");
         [y[on + 500], y[on + 1000], y[on + 2000]]
     };
-    // On for 5 s: the flow separates afterwards, as expected.
+    // After blowing for 5 s the flow separates, as expected.
     for (found, expected) in after(5_000).into_iter().zip([0.375, 0.158, 0.024]) {
         near(found, expected, 2e-3);
     }
-    // On for 3 s: the flow does not separate for two seconds.
+    // After blowing for 3 s the flow does not separate for two seconds.
     for (found, expected) in after(3_000).into_iter().zip([0.98, 0.92, 0.79]) {
         near(found, expected, 2e-2);
     }
-    // On for 8 s: the flow separates while the jets still blow.
+    // During blowing for 8 s the flow separates while the jets still blow.
     let y = run(&averaged, &vec![1.0; 8_000]).expect("bounded");
     near(y[4_900], 1.010, 5e-3);
     near(y[7_999], 0.26, 1e-2);

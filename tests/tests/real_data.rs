@@ -237,7 +237,7 @@ fn the_flow_over_a_ramp_is_described_by_stand_ins() {
     let ladder = &found.ladder;
     assert_eq!(found.verdict, Verdict::PartlyExplained, "{ladder:?}");
     assert!(found.missing.is_empty());
-    // The lags alone reach 47 %; the search reached no more before it followed less promising candidates.
+    // The lags alone reach a FIT of 47 %; the search must follow less promising candidates to reach more.
     let last = ladder.last().expect("a rung");
     assert!(last.validate_fit_percent > 65.0, "{ladder:?}");
 }

@@ -34,7 +34,7 @@ fn bundled_sets_are_answered_right() {
 #[ignore = "measured sets, which are not part of the project: cargo xtask kept-rigs"]
 fn measured_sets_are_no_worse_than_the_baselines() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data/real");
-    // The others have tens of thousands of samples: `cargo xtask strangers --folder`.
+    // The other sets have tens of thousands of samples; `cargo xtask strangers --folder` runs them.
     let small = ["ball", "buck", "dc_motor", "gas", "hair", "halogen"];
     all_right(&options(vec![folder], &small), small.len());
 }

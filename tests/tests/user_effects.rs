@@ -37,7 +37,7 @@ impl Rig {
             if *u != last {
                 (edge, last) = (start, *u);
             }
-            // Twelve uniform numbers make one that is nearly normal.
+            // The sum of twelve uniform numbers is nearly normal.
             let noise: f64 = (0..12).map(|_| rng.random_range(-0.5..0.5)).sum();
             y.push((self.reading)(friction, film) + NOISE * noise);
             temperature.push((self.air)(start));

@@ -117,7 +117,7 @@ fn texts(path: &Path) -> Vec<String> {
     while let Some(c) = letters.next() {
         match (&mut literal, c) {
             (Some(text), '\\') => {
-                // A continued line: the break and the indent are not part of the text.
+                // In a continued line, the line break and the indent are not part of the text.
                 match letters.next() {
                     Some('\n') => {
                         let rest = letters.clone();
@@ -135,7 +135,7 @@ fn texts(path: &Path) -> Vec<String> {
             (Some(text), c) => text.push(c),
             (None, '"') => literal = Some(String::new()),
             (None, '\'') => {
-                // A character, or a lifetime.
+                // This begins a character literal or a lifetime.
                 let mut ahead = letters.clone();
                 if ahead.next() == Some('"') && ahead.next() == Some('\'') {
                     letters = ahead;

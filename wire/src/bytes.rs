@@ -2,7 +2,8 @@
 
 use heapless::Vec;
 
-/// Content that is being written. Content beyond the capacity is cut off; the sizes of the messages exclude this.
+/// Content that is being written. Content beyond the capacity is cut off; all messages are shorter than the
+/// capacity.
 pub(crate) struct Writer<const N: usize>(pub(crate) Vec<u8, N>);
 
 impl<const N: usize> Writer<N> {

@@ -16,13 +16,13 @@ pub const WIRE: usize = CONTENT + 4 + 4;
 pub enum Damage {
     /// Longer than any frame.
     TooLong,
-    /// Byte-stuffing does not add up.
+    /// The byte-stuffing is inconsistent.
     Stuffing,
     /// Checksum differs.
     Checksum,
 }
 
-/// A frame for the wire, written byte by byte, so that no sample has to write a whole one.
+/// A frame for the wire, written byte by byte, so that the work is spread over several samples.
 ///
 /// ```
 /// use wire::frame::{Frame, Receiver};
@@ -139,7 +139,7 @@ pub struct Receiver {
     done: bool,
     /// Bytes until the next stuffed zero; 0 before a frame's first byte.
     left: u8,
-    /// Whether a zero belongs at the end of the count.
+    /// Whether a zero byte must be inserted when `left` reaches 0.
     zero_due: bool,
     damage: Option<Damage>,
 }
@@ -233,7 +233,8 @@ mod tests {
             (0..length)
                 .map(|_| {
                     seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-                    // Many zeros and, in long frames, long sequences without a zero.
+                    // The content has many zeros and, in long frames, long sequences without a
+                    // zero.
                     let byte = (seed >> 24) as u8;
                     if length % 3 == 0 {
                         byte | 1

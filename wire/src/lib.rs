@@ -14,9 +14,9 @@
 //! | readings (disarmed, playing) | 18 + 24 · 3 = 90 | 97 | 4.0 | 35 % |
 //! | with the law (armed) | 22 + 24 · 7 = 190 | 197 | 8.2 | 71 % |
 //!
-//! so that answers fit too, and a loop that sends nothing for an eighth of its time. A board with less than 0.4 ms
-//! per sample (0.8 ms with the law) produces more than the line transmits. Frames that do not fit are left out
-//! completely and counted, and the host detects them by their numbers.
+//! The remaining capacity is enough for the answers, and for a loop that cannot send during an eighth of its time.
+//! A board with less than 0.4 ms per sample (0.8 ms with the law) produces more than the line transmits. Frames
+//! that do not fit are left out completely and counted, and the host detects them by their numbers.
 #![no_std]
 
 #[cfg(test)]

@@ -5,7 +5,7 @@ use heapless::Deque;
 /// Bytes of a queue on a board: two frames of the law's samples and an answer.
 pub const ROOM: usize = 640;
 
-/// Bytes waiting for the line. No call waits.
+/// Queue of the bytes to be sent. None of its functions blocks.
 #[derive(Clone, Debug, Default)]
 pub struct Outbox {
     bytes: Deque<u8, ROOM>,

@@ -5,7 +5,8 @@ use crate::frame::{CONTENT, Frame};
 
 /// The version of this protocol; host and board must have the same.
 pub const PROTOCOL: u8 = 2;
-/// A host without a message for this time counts as lost, ms. The command that it plays then ends.
+/// Time without a message after which a host counts as lost, ms. The board then ends the command
+/// that it plays for this host.
 pub const LOST_AFTER_MS: u32 = 500;
 
 /// [`LOST_AFTER_MS`] in samples of `period_us`, at least ten, because the board receives at most one message per
@@ -30,7 +31,7 @@ pub const fn lost_after_samples(period_us: u32) -> u32 {
 pub enum Status {
     /// Done.
     Done = 0,
-    /// Another host has the board.
+    /// Another host controls the board.
     Busy = 1,
     /// More runs (intervals of constant command) than the board can store; the detail is the number that it can store.
     TooLong = 2,
@@ -139,9 +140,10 @@ pub struct Info {
     pub rig: u32,
     /// From counts to y.
     pub sensor: Scale,
-    /// Readings at or beyond these are at a rail, counts.
+    /// Lower and upper limit of the readings, counts. A reading at or beyond a limit counts as
+    /// saturated.
     pub rails: [f32; 2],
-    /// Equal readings in a row that mean a stuck sensor.
+    /// Number of equal readings in a row after which the sensor counts as stuck.
     pub stuck_after: u32,
     /// Residual's envelope, y.
     pub envelope: f32,
@@ -153,7 +155,7 @@ pub struct Info {
     pub phase: Phase,
     /// Samples since the start.
     pub samples: u64,
-    /// Runs that a command may have.
+    /// Largest number of runs of a command.
     pub most_runs: u16,
     /// Damaged frames received since the start, wrapping.
     pub damaged: u32,

@@ -37,7 +37,7 @@ pub enum Ask<'a> {
         /// [`checksum`] of its runs, so that the played command is the intended one.
         checksum: u32,
     },
-    /// Stream every sample from now on, whatever the valve does.
+    /// Stream every sample from now on, whether or not the valve moves.
     Stream,
     /// Let the law drive the valve; also ends a pause.
     Arm,

@@ -10,14 +10,14 @@ use crate::reply::Phase;
 
 /// Largest number of samples in a frame.
 pub const BATCH: usize = 24;
-/// Fraction of a count in which the law's signals are sent.
+/// Steps per count in which the law's signals are sent.
 pub const STEPS: f32 = 8.0;
 /// Largest count of a 12-bit converter; NaN is sent as this.
 pub const FULL: u16 = 0xFFF;
 
 const READINGS: u8 = 0x40;
 const LAW: u8 = 0x41;
-/// Kind, session, first number, phase, last, left out.
+/// Length of a frame's header, bytes: kind, session, first number, phase, last, left out.
 const HEAD: usize = 1 + 4 + 4 + 1 + 1 + 4;
 
 /// A streamed sample.
@@ -29,8 +29,8 @@ pub struct Sample {
     pub channel: u16,
     /// The valve from this sample to the next.
     pub open: bool,
-    /// While the law runs: the model's predicted reading, and the deviation of the reading from it, counts of the
-    /// sensor.
+    /// Predicted reading of the model and deviation of the reading from it, both in counts of the sensor. `None`
+    /// if the law does not run.
     pub law: Option<Law>,
 }
 
@@ -39,7 +39,8 @@ pub struct Sample {
 pub struct Law {
     /// The model's predicted reading.
     pub model: f32,
-    /// Reading (averaged if the model is) minus the prediction; a difference, without zero.
+    /// Reading minus prediction, without the sensor's zero. For an averaged model, the averaged
+    /// reading is used.
     pub residual: f32,
 }
 
@@ -109,7 +110,7 @@ impl Batch {
                 self.frame.put(&reference.to_bits().to_le_bytes());
             }
         }
-        // Two times 12 bits in three bytes.
+        // Two 12-bit numbers are stored in three bytes.
         let (counts, channel) = (sample.counts.min(FULL), sample.channel.min(FULL));
         let [c0, c1] = counts.to_le_bytes();
         let [d0, d1] = channel.to_le_bytes();
@@ -159,7 +160,7 @@ impl Batch {
         self.count = 0;
     }
 
-    /// The phase that is sent at an end without samples.
+    /// Sets the phase that a last frame without samples reports.
     pub fn note(&mut self, phase: Phase) {
         if self.count == 0 {
             self.phase = phase;
@@ -178,7 +179,7 @@ fn kind(sample: &Sample) -> u8 {
 }
 
 fn steps(counts: f32) -> i16 {
-    // Saturates; no number is 0.
+    // The conversion saturates; NaN becomes 0.
     (counts * STEPS) as i16
 }
 

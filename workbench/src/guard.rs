@@ -43,7 +43,7 @@ impl Guard {
     fn check(&self, request: &Request) -> Result<(), &'static str> {
         let headers = request.headers();
         let text = |name: &HeaderName| headers.get(name).map(|v| v.to_str().unwrap_or("\0"));
-        // Exactly one `Host` header, which is the server's own address.
+        // There must be exactly one `Host` header, with the server's own address.
         let single = headers.get_all(HOST).iter().count() == 1;
         if !(single && text(&HOST).is_some_and(|host| self.own(host))) {
             return Err("this address does not belong to the workbench; open the printed one");
@@ -95,7 +95,7 @@ fn harden(headers: &mut HeaderMap) {
     for (name, value) in [
         (X_CONTENT_TYPE_OPTIONS, "nosniff"),
         (X_FRAME_OPTIONS, "DENY"),
-        // The token is in the address.
+        // The token is in the address, so the address must not be sent to other sites.
         (REFERRER_POLICY, "no-referrer"),
         (CACHE_CONTROL, "no-store"),
         (

@@ -97,7 +97,7 @@ pub(crate) async fn serve(listener: TcpListener, router: Router) -> std::io::Res
         let place = places.clone().acquire_owned().await;
         let (stream, _) = match listener.accept().await {
             Ok(accepted) => accepted,
-            // Out of file descriptors: waits until some are free.
+            // If there are no free file descriptors, the server waits until some are free.
             Err(_) => {
                 tokio::time::sleep(Duration::from_millis(50)).await;
                 continue;

@@ -69,7 +69,7 @@ pub trait Bench: Send + Sync + 'static {
     /// # Errors
     /// [`Refusal`] in words for the user.
     fn select(&self, model: u32) -> Result<(), Refusal>;
-    /// Other quick queries and changes: a JSON document for a JSON document.
+    /// Answers other quick queries and makes quick changes. Question and answer are JSON documents.
     ///
     /// # Errors
     /// [`Refusal`] in words for the user.
@@ -144,7 +144,7 @@ fn router<B: Bench>(bench: B, rules: Guard) -> Router {
             intake::Uploads::new(),
             intake::take_in,
         ))
-        // Checked first, so that the content of a foreign request is never read.
+        // The guard runs first, so that the content of a foreign request is never read.
         .layer(middleware::from_fn_with_state(rules, guard))
 }
 
@@ -264,7 +264,7 @@ async fn run<B: Bench>(State(shared): At<B>, body: Bytes) -> Result<Response, Re
         let why = "a task is running already; wait for it, or cancel it";
         return Err(refused(StatusCode::CONFLICT, why));
     }
-    // Not awaited: the page is informed of its end by an event.
+    // The request does not wait for the task; an event informs the page of its end.
     tokio::task::spawn_blocking(move || {
         let work = shared.work.clone();
         let done = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {

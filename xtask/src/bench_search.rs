@@ -104,7 +104,7 @@ fn bench(arguments: &[String]) -> Result<()> {
             .args(["--evaluations", &request.evaluations.to_string()])
             .args(["--seconds", &request.seconds.to_string()])
             .args(request.ours.then_some("--ours"))
-            // One thread per run, so that processor time is comparable.
+            // Each run has one thread, so that processor time is comparable.
             .env("OMP_NUM_THREADS", "1");
         for line in output(&mut search)?.lines() {
             let (method, rest) = line.split_once(',').context("a line without fields")?;
@@ -158,7 +158,7 @@ fn table(lines: &str) -> Result<String> {
             let most = |f: fn(&Run) -> f64| runs.iter().map(f).fold(f64::NEG_INFINITY, f64::max);
             let lowest = runs.iter().map(|r| r.value).fold(f64::INFINITY, f64::min);
             let highest = most(|r| r.value);
-            // Runs that reached the limit or failed.
+            // These are the runs that reached the limit or failed.
             let stopped = runs.iter().filter(|r| !r.by_itself).count();
             text += &format!(
                 "  {method:<24}{:>5}{:>13.0}{lowest:>11.5}{highest:>11.5}{:>11.3}{:>9.2}{:>9.2}{stopped:>9}\n",

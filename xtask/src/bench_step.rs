@@ -39,7 +39,7 @@ fn bench_step(_arguments: &[String]) -> Result<()> {
     let mut objects = Vec::new();
     for (source, options) in [
         (&source, &["-O3"][..]),
-        // The options recommended on the page of the export.
+        // These are the options that the page on exports recommends.
         (&exported, &["-std=c99", "-O2", "-ffp-contract=off"]),
     ] {
         let object = source.with_extension("o");

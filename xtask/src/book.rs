@@ -1,6 +1,7 @@
-//! The book: the pages of `docs` with the catalogue's, built by mdBook.
+//! Builds the book with mdBook from the pages of `docs` and those of the catalogue.
 //!
-//! Pages of effects are written from the cards (`host-fit effects --json`) and checked in, so that links to them hold without a build.
+//! Pages of effects are written from the cards (`host-fit effects --json`) and checked in, so that links to them hold
+//! without a build.
 
 use std::fmt::Write as _;
 use std::fs;

@@ -75,7 +75,7 @@ fn exceeded(budgets: &Budgets, outcome: &Outcome, board: Size) -> Vec<String> {
             Some(limit) => Some(format!("{name} {found:.0} of {limit:.0}")),
             None => Some(format!("{name} has no budget")),
         });
-    // Without tolerance: a step must fit into its sample.
+    // The worst sample has no tolerance, because a step must fit into its sample.
     let worst = budgets
         .most_instructions
         .iter()

@@ -32,7 +32,7 @@ fn in_folder(folder: &Path) -> Result<()> {
     }
     let record = root().join(SET).join(RECORD).with_extension("csv");
     std::fs::copy(record, folder.join("record.csv"))?;
-    // The law was designed for another model than the record's.
+    // The law was designed for another model than that of the record.
     for (language, file, model) in [
         ("python", "flow.py", MODEL),
         ("matlab", "flow.m", MODEL),
@@ -86,7 +86,7 @@ fn in_folder(folder: &Path) -> Result<()> {
         .split([' ', ','])
         .filter_map(|word| word.parse().ok())
         .collect();
-    // Within 0.01 of y, far below the error of a failing law.
+    // The mean is within 0.01 of the reference, far below the error of a failing law.
     let holds = matches!(numbers[..], [mean, reference] if (mean - reference).abs() < 0.01);
     ensure!(holds, "the law in C: {found}");
     println!("C: {found}");
@@ -167,7 +167,7 @@ fn scripts(folder: &Path) -> Result<()> {
     println!("own effect: FIT {:.1} → {:.1} %", own[0], own[1]);
     recipe("heater", &[folder])?;
     let heater = fits(&["heater.toml"], &folder.join("heater"))?;
-    // A first order with dead time has 99.1 %.
+    // A first order with dead time has a FIT of 99.1 %.
     ensure!(
         matches!(heater[..], [fit] if fit > 98.5),
         "heater: {heater:?}"

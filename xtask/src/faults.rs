@@ -118,7 +118,8 @@ fn dialogue(line: &mut Line) -> Result<()> {
     line.until("status", |answer| answer.starts_with("disarmed"))?;
     for (injection, reason) in INJECTED {
         line.until("arm", |answer| answer.starts_with("armed"))?;
-        // The law must hold the flow first; before that, a stuck sensor would show in the residual first.
+        // The law must hold the flow first; before that, a stuck sensor would be detected by the residual
+        // and not as stuck.
         line.until("status", |answer| {
             answer.contains("valve=1") && friction(answer).is_some_and(|y| y > 0.4)
         })?;

@@ -81,7 +81,8 @@ impl Chosen {
                 named.display()
             )
         })?;
-        // A separate name, so that a build of the bundled model does not overwrite it.
+        // The program gets a separate name, so that a build of the bundled model does not overwrite
+        // it.
         let stem = named.file_stem().unwrap_or_default().to_string_lossy();
         let own = firmware_target().join(format!("{board}-{stem}"));
         std::fs::copy(&elf, &own).with_context(|| own.display().to_string())?;

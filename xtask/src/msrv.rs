@@ -26,7 +26,7 @@ pub(crate) fn msrv() -> Result<()> {
     let Some(version) = version else {
         bail!("firmware/Cargo.toml: no `workspace.package.rust-version`");
     };
-    // Debian's compiler comes without rustup, and in one version.
+    // Debian's compiler comes without rustup and in one version only.
     let has_rustup = command("rustup", &["--version"]).output().is_ok();
     if has_rustup {
         let install = ["toolchain", "install", version, "--profile", "minimal"];

@@ -133,7 +133,7 @@ fn cards(published: &[Card]) -> Vec<String> {
                 faults.push(format!("{}: Cargo.toml has no `{key}`", card.name));
             }
         }
-        // Cargo leaves out of a package what only its tests need.
+        // Cargo omits development dependencies from a package.
         let needed = card
             .dependencies
             .iter()
@@ -157,7 +157,7 @@ fn cards(published: &[Card]) -> Vec<String> {
     faults
 }
 
-/// The project's files that the programs are compiled from and no package contains.
+/// The project's files from which the programs are compiled and that no package contains.
 fn outside(packed: &BTreeSet<PathBuf>) -> Result<Vec<String>> {
     // `cargo test` compiles the programs without these lists.
     let mut build = cargo("build --release --quiet");

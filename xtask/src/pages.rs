@@ -27,7 +27,8 @@ pub(crate) fn pages(arguments: &[String]) -> Result<()> {
         npm.current_dir(&web);
         run(&mut npm)
     };
-    // The versions of the lock file; scripts of packages are not run at installation.
+    // The installed versions are those of the lock file; scripts of packages are not run at
+    // installation.
     npm(&["ci", "--ignore-scripts", "--no-audit", "--no-fund"])?;
     npm(&["run", "check"])?;
     npm(&["test"])?;

@@ -50,7 +50,7 @@ pub(crate) fn setup(_arguments: &[String]) -> Result<()> {
     .into_iter()
     .filter(|(program, _)| !exists(program))
     .map(|(_, package)| package)
-    // Not a program: checked by importing it in Python.
+    // NumPy is not a program, so it is checked by importing it in Python.
     .chain(python().is_err().then_some("python3-numpy"))
     // Makes virtual environments.
     .chain((!python().is_ok_and(|python| imports(python, "ensurepip"))).then_some("python3-venv"))

@@ -8,7 +8,7 @@ use model_core::{Input, step};
 
 fn main() {
     let model = model();
-    // The rig: here the model itself; yours reads a converter.
+    // The rig is the model itself here; your program reads a converter instead.
     let mut rig = state(&model);
     let mut law = LAW.start::<_, LOOK_AHEAD>(state(&model));
     let channels = [0.0; CHANNELS.len()];

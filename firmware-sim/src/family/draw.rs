@@ -125,7 +125,7 @@ impl RigPlan {
         // Effects that depend on time or start late are visible only in the whole record.
         let late = !kinds.beyond.is_empty();
         let bare = self.plant.clone();
-        // Effects are drawn for the friction that the flow reaches, not for its drive.
+        // Sizes of effects are drawn for the friction that the flow reaches, not for its drive.
         let reached = BasePlant {
             gain: bare.base.gain / bare.character.overshoot(),
             ..bare.base
@@ -322,7 +322,7 @@ impl NoiseKind {
     }
 }
 
-/// Frequencies (Hz) and duties of five different squares.
+/// Frequencies (Hz) and duties of five different square waves.
 pub(super) fn squares(rng: &mut ChaCha8Rng) -> Vec<(f64, f64)> {
     let mut all = vec![
         (2.0, 0.3),

@@ -87,17 +87,19 @@ pub struct RigPlan {
 }
 
 impl RigPlan {
-    /// A random rig of a family that hides the named effects: of the catalogue, laws of
-    /// [`Altered`](crate::plant::Altered), physics [`Beyond`](crate::plant::Beyond) it, or [`Fault`](crate::plant::Fault)s.
+    /// A random rig of a family with the named effects hidden. These may be effects of the catalogue, laws of
+    /// [`Altered`](crate::plant::Altered), physics of [`Beyond`](crate::plant::Beyond), or
+    /// [`Fault`](crate::plant::Fault)s.
     ///
     /// Effects are drawn from their usual ranges until they are detectable, and the flow is drawn anew if none is.
-    /// Detectable means three changes of the readings on a random on/off command, in standard errors of the
-    /// average. The total change is at least 4. The part that no change of the flow's gain, time constants, delay
-    /// and zero imitates is at least 1.2. The part that no memory of the flow up to 0.48 s imitates either, alone
-    /// and times the jet, is at least 0.6; the best model without the effect then has an error of 1.17 × the noise
-    /// level. Short lags are not among the imitations, because lags in series commute: a lag of the sensor equals
-    /// one of the flow. If no flow satisfies these conditions, more than twenty repeats are averaged.
-    /// [`weight`](Self::weight) is below 1 if even that does not suffice.
+    /// An effect is detectable if its change of the readings on a random on/off command is large enough, in
+    /// standard errors of the average. The total change must be at least 4. The part that a change of the flow's
+    /// gain, time constants, delay and zero cannot imitate must be at least 1.2. The part that memories of the
+    /// flow up to 0.48 s, alone or multiplied by the jet, cannot imitate either must be at least 0.6; the best
+    /// model without the effect then has an error of 1.17 × the noise level. Short lags are not among the
+    /// imitations, because lags in series commute: a lag of the sensor equals one of the flow. If no flow
+    /// satisfies these conditions, more than twenty repeats are averaged. [`weight`](Self::weight) is below 1 if
+    /// even that does not suffice.
     ///
     /// # Errors
     /// [`RigError`] for unknown names and for effects that exclude each other.

@@ -14,7 +14,8 @@ impl RigPlan {
     pub fn also_true(&self) -> Vec<Truth> {
         let delay = match self.plant.delay() {
             FlowDelay::Fixed { .. } => None,
-            // A delay law depends on a mean of the friction, which other means of the past resemble.
+            // A delay law depends on one mean of the friction, and other means of the past are
+            // similar to it.
             FlowDelay::StateDependent { .. } | FlowDelay::Clamped { .. } => Some(Truth::new(
                 Port::Delay,
                 &["mean y", "memory of y", "past y", "y"],
@@ -31,7 +32,7 @@ impl RigPlan {
             Character::RateOfFriction { .. } => Some(&["y"][..]),
         };
         let flow = flow.map(|coordinates| Truth::new(Port::Flow, coordinates));
-        // A memory that is lost under the jet acts as a factor on the jet.
+        // A memory that the jet reduces has the same effect as a factor on the jet.
         let jet = match &self.plant.character {
             Character::Memory(terms) if terms.iter().any(|term| term.lost != 0.0) => {
                 Some(Truth::new(Port::Jet, &["past y"]))

@@ -23,7 +23,8 @@ const POSSIBLE: RangeInclusive<f64> = -0.8..=2.8;
 /// Relative step of the flow's constants for their sensitivities.
 const STEP: f64 = 0.02;
 
-/// Number of memories, alone and times the jet: every 40 ms up to 0.48 s.
+/// Number of memory lengths: every 40 ms up to 0.48 s. Each memory is used alone and multiplied by
+/// the jet.
 const MEMORIES: usize = 12;
 const BETWEEN_MEMORIES: usize = 40;
 
@@ -107,7 +108,8 @@ impl Weight {
         Ok(run)
     }
 
-    /// Change by a small memory of each length, alone and times the jet; it drives the flow like the jet.
+    /// Change of the readings by a small memory of each length, alone and multiplied by the jet. The
+    /// memory drives the flow like the jet.
     fn memories_of(&self, base: &BasePlant) -> Vec<Vec<f64>> {
         let delay = (base.delay.at(MIDDLE) / SAMPLE_PERIOD_S).round() as usize;
         let past = |x: &[f64], k: usize, lag: usize| k.checked_sub(lag).map_or(0.0, |k| x[k]);

@@ -71,7 +71,7 @@ impl GomanKhrabrov {
 
 impl Flow for GomanKhrabrov {
     fn step(&mut self, jet: f64) {
-        // A distance of 1 leads from the slot to the separated flow.
+        // The distance from the slot to the separated flow is 1.
         self.way += STEP_S / self.carrying_s * (1.0 + self.faster * self.x);
         self.on_their_way.push_back((self.way, jet));
         while let Some(&(begun, strength)) = self.on_their_way.front()

@@ -206,7 +206,7 @@ mod tests {
             let (mut changed, mut plain, mut flow) = (0.0_f64, 0.0, 0.0);
             for k in 0..50_000 {
                 let u = f64::from(u8::from(k / 2000 % 2 == 1));
-                // A flow with a time constant of 20 ms, without and with the effect.
+                // The flow has a time constant of 20 ms and is run without and with the effect.
                 plain += STEP_S / 0.02 * (u - plain);
                 flow += STEP_S / 0.02 * (hidden.jet(u) - flow);
                 let y = hidden.reading(flow, u, f64::from(k) * STEP_S);

@@ -92,7 +92,8 @@ impl Flow for MeanField {
 mod tests {
     use super::*;
 
-    /// From a small disturbance: growth at the rate μ, then a circle of radius √μ around w = μ.
+    /// From a small disturbance the mode grows at the rate μ, then moves on a circle of radius √μ
+    /// around w = μ.
     #[test]
     fn the_mode_grows_at_its_rate_and_saturates_on_its_limit_cycle() {
         let growth = 0.1;

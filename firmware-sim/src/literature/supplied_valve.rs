@@ -149,7 +149,7 @@ impl SuppliedValve {
     /// Jet strength in steady blowing: p = 1 − Z_eff·√p with the impedance of the damped line.
     fn steady(&self) -> f64 {
         let z = self.line.impedance * (1.0 - KEPT) / (1.0 + KEPT);
-        // √p is the root of √p² + z·√p − 1 = 0.
+        // √p is the positive root of x² + z·x − 1 = 0.
         (z * z / 4.0 + 1.0).sqrt() - z / 2.0
     }
 }

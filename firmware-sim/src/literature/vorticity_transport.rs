@@ -64,7 +64,7 @@ impl Flow for VorticityTransport {
             w[i] = own - carried * (right - left) + spread * (left - 2.0 * own + right);
             before = own;
         }
-        // No gradient at the end of the ramp.
+        // At the end of the ramp the gradient is 0.
         w[CELLS] = w[CELLS - 1];
     }
 
@@ -112,7 +112,7 @@ mod tests {
                 flow.step(1.0);
                 k += 1;
             }
-            // Lengths in ramps, times in passages: U = 1, D = 1/peclet.
+            // Lengths are in ramp lengths and times in passage times, so U = 1 and D = 1/peclet.
             let t = time / passing;
             let wide = 2.0 * (t / peclet).sqrt();
             let exact = 0.5 * erfc((FILM - t) / wide)

@@ -144,8 +144,8 @@ pub(crate) fn log_uniform(rng: &mut ChaCha8Rng, low: f64, high: f64) -> f64 {
 }
 
 impl BasePlant {
-    /// A rig at random: time constants 20–150 ms that differ by at least a quarter, gain 0.85–1.15,
-    /// state-dependent delay between 20 and 60 ms.
+    /// A random base plant with time constants of 20–150 ms that differ by at least a quarter, a
+    /// gain of 0.85–1.15 and a state-dependent delay between 20 and 60 ms.
     ///
     /// rise·rate stays below 0.2 s so that the delay never grows faster than time (|dỹ/dt| ≤ 4 /s).
     pub fn draw(rng: &mut ChaCha8Rng) -> Self {
@@ -178,7 +178,7 @@ impl BasePlant {
     /// [`BasePlantError`] naming the first bad property.
     pub fn validate(&self) -> Result<(), BasePlantError> {
         let within = |property, value: f64, low: f64, high: f64, requirement| {
-            // Written so that NaN is rejected too.
+            // The condition is written so that NaN is rejected too.
             if value >= low && value <= high {
                 Ok(())
             } else {

@@ -155,7 +155,7 @@ impl Character {
     /// [`BasePlantError`] naming the first bad property.
     pub fn validate(&self) -> Result<(), BasePlantError> {
         let within = |property, value: f64, low: f64, high: f64, requirement| {
-            // Written so that NaN is rejected too.
+            // The condition is written so that NaN is rejected too.
             if value >= low && value <= high {
                 return Ok(());
             }

@@ -84,7 +84,7 @@ impl Flow {
         let (own_dot, memories_dot) = rest.split_at_mut(own.len());
         let extra = (self.parts.iter().zip(memories)).fold(0.0, |sum, (p, z)| sum + p.drive(s, *z));
 
-        // The level without and with the jet, and the quantity that follows it.
+        // Level without and with the jet, and the state that follows this level.
         let (mut off, mut on, mut follower) = (0.0, self.gain, s);
         match &self.character {
             Character::FirstOrder
@@ -112,7 +112,7 @@ impl Flow {
             }
         }
         // Above full strength the separating share would be negative, and a rate that grows with the friction
-        // would make the flow diverge: it is not applied.
+        // would make the flow diverge. The dependence on the friction is therefore not applied there.
         let separation = if j > 1.0 {
             1.0
         } else {
@@ -231,7 +231,7 @@ pub(crate) mod bench {
 
     const DT: f64 = 5e-5;
 
-    /// Attaches in 40 ms, separates in 100 ms, gain 1.
+    /// A flow that attaches in 40 ms and separates in 100 ms, with gain 1.
     pub(crate) fn flow(parts: impl IntoIterator<Item = Part>) -> Flow {
         let parts = parts.into_iter().map(|part| match part {
             Part::Flow(part) => part,
@@ -292,7 +292,7 @@ mod tests {
         let s = hold(&mut flow, 1.0, t);
         assert!((s - expected).abs() < 1e-7, "{s} {expected}");
         assert!((hold(&mut flow, 1.0, 5.0) - 1.0 / (1.0 - k)).abs() < 1e-9);
-        // Without the jet only the gain remains, and the flow returns to rest.
+        // Without the jet the level is gain·s(t − delay), and the flow returns to rest.
         let s = hold(&mut flow, 0.0, 0.1);
         let blown = 1.0 / (1.0 - k);
         let level = gain * blown;
@@ -325,7 +325,7 @@ mod tests {
         let t = 0.05_f64;
         let response = |a: f64, b: f64| 1.0 - (a * (-t / a).exp() - b * (-t / b).exp()) / (a - b);
         assert!((hold(&mut flow, 1.0, t) - response(0.04, 0.01)).abs() < 1e-9);
-        // time·s² + s + rate: the poles of the flow with inertia.
+        // The poles of the flow with inertia are the roots of time·s² + s + rate.
         let time_s = 0.008;
         let mut flow = flow_of(Character::Inertia { time_s });
         let root = (1.0_f64 - 4.0 * time_s / 0.04).sqrt();

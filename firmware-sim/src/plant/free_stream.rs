@@ -12,8 +12,8 @@ pub(crate) const MEAN_TEMPERATURE: f64 = 20.0;
 /// U∞(t): a mean and three slow waves, the same in every repeat of the record; and the temperature of the air,
 /// which varies independently.
 ///
-/// The mean over the sampled record is exactly [`MEAN_FREE_STREAM`], so "its mean" is the same number for one
-/// record and for all records.
+/// The mean over the sampled record is exactly [`MEAN_FREE_STREAM`], so one record and all records have the
+/// same mean.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FreeStream {
     /// (amplitude in m/s, frequency in Hz, phase in rad)
@@ -36,7 +36,8 @@ impl FreeStream {
                 rng.random_range(0.0..std::f64::consts::TAU),
             );
         }
-        // A separate random stream, so that rigs without a temperature are unchanged.
+        // The temperature has a separate random stream, so that rigs without a temperature are
+        // unchanged.
         let mut own = ChaCha8Rng::seed_from_u64(waves[0].2.to_bits());
         let warmth = [(2.5, 0.12, 0.30), (1.5, 0.35, 0.80)].map(|(size, low, high)| {
             (

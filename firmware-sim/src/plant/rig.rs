@@ -58,7 +58,8 @@ impl PlantSpec {
         }
     }
 
-    /// The delay in force: a hidden effect's, if one is a delay law, otherwise the base plant's.
+    /// The delay of the plant: that of a hidden delay law if there is one, otherwise that of the
+    /// base plant.
     pub fn delay(&self) -> FlowDelay {
         let parts = self.parts(&Surroundings::default()).into_iter();
         parts.fold(self.base.delay, |law, part| match part {
@@ -272,7 +273,7 @@ pub(crate) mod bench {
     use super::*;
     use crate::plant::RateLaw;
 
-    /// Attaches in 40 ms, separates in 100 ms, gain 1.
+    /// A base plant that attaches in 40 ms and separates in 100 ms, with gain 1.
     pub(crate) fn base(delay: FlowDelay) -> BasePlant {
         BasePlant {
             attach_s: 0.04,
@@ -335,7 +336,7 @@ mod tests {
             },
             &[],
         );
-        // From rest the mean is 0: the delay of the first edge is floor + rise.
+        // The mean friction at rest is 0, so the delay of the first edge is floor + rise.
         rig.command(1.0);
         for _ in 0..42 {
             rig.advance_sample();
@@ -348,7 +349,8 @@ mod tests {
         rig.advance_sample();
         let expected = 1.0 - (-0.001_f64 / 0.04).exp();
         assert!((rig.friction() - expected).abs() < 1e-3 * expected + 2e-4);
-        // After long blowing the mean is 1: the delay of the falling edge is floor + rise·exp(−rate).
+        // After long blowing the mean friction is 1, so the delay of the falling edge is floor +
+        // rise·exp(−rate).
         for _ in 0..2000 {
             rig.advance_sample();
         }
@@ -402,7 +404,8 @@ mod tests {
 
     #[test]
     fn effects_add_up_in_the_physical_order() {
-        // A lagging valve, a drooping plenum and King's law together, under steady blowing.
+        // The rig has a lagging valve, a drooping plenum and King's law together, under steady
+        // blowing.
         let (ratio, offset) = (1.5, 0.05);
         let effects = [
             HotFilmNonlinearity {

@@ -66,7 +66,8 @@ impl ArrivalClock {
     /// The delay at mean friction `mean` (s).
     pub(crate) fn delay(&self, mean: f64) -> f64 {
         match self.law {
-            // This law has already changed the times of the edges, before they reached the valve.
+            // An edge-dependent law has already changed the times of the edges, before they reached
+            // the valve.
             FlowDelay::EdgeDependent { .. } => 0.0,
             law => law.at(mean),
         }

@@ -15,6 +15,6 @@ fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
     unsafe extern "C" {
         fn a_panic_is_linked() -> !;
     }
-    // SAFETY: never runs; a program with it does not link.
+    // SAFETY: this is never executed, because a program that contains it does not link.
     unsafe { a_panic_is_linked() }
 }

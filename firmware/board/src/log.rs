@@ -20,8 +20,8 @@ struct Frames {
     restore: UnsafeCell<critical_section::RestoreState>,
 }
 
-// SAFETY: only touched between `acquire` and `release`, which is a critical
-// section on a single core.
+// SAFETY: the data are used only between `acquire` and `release`, which is a critical section on a
+// single core.
 unsafe impl Sync for Frames {}
 
 static FRAMES: Frames = Frames {
@@ -32,7 +32,7 @@ static FRAMES: Frames = Frames {
 // SAFETY: a frame is complete before another begins, see `Frames`.
 unsafe impl defmt::Logger for Logger {
     fn acquire() {
-        // SAFETY: released in `release`, which defmt calls after each `acquire`.
+        // SAFETY: the section is released in `release`, which defmt calls after each `acquire`.
         unsafe {
             FRAMES.restore.get().write(critical_section::acquire());
             transport::begin();

@@ -2,7 +2,8 @@
 //! and `rig` the rig to which they are connected.
 //!
 //! The constants in `generated/` belong to the model files in `models/`: `cargo xtask identified` regenerates them,
-//! and CI compares. `cargo xtask firmware --model FILE` replaces them by the constants of that model for one build.
+//! and CI checks that they agree. `cargo xtask firmware --model FILE` replaces them by the constants of that model
+//! for one build.
 #![no_std]
 #![forbid(unsafe_code)]
 

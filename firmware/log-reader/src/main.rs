@@ -16,7 +16,7 @@ fn main() -> Result<()> {
     loop {
         match decoder.decode() {
             Ok(frame) => println!("{}", frame.display(false)),
-            // A restart within a frame leaves a damaged one.
+            // A restart of the board within a frame leaves a damaged frame.
             Err(DecodeError::Malformed) if table.encoding().can_recover() => {}
             Err(DecodeError::Malformed) => bail!("the frames are damaged"),
             Err(DecodeError::UnexpectedEof) => return Ok(()),

@@ -32,14 +32,14 @@ impl Sampler {
     ) -> Self {
         ADC1::enable(rcc);
         ADC1::reset(rcc);
-        // 84 MHz / 4 = 21 MHz; 480 cycles of it are 23 µs, for sources of some kΩ.
+        // 84 MHz / 4 = 21 MHz; 480 cycles of this clock are 23 µs, for sources of some kΩ.
         common.ccr().write(|w| w.adcpre().div4());
         converter
             .smpr2()
             .write(|w| w.smp0().cycles480().smp1().cycles480());
-        // One conversion of channel 0, as after a reset of SQR1 to SQR3, followed automatically by one of channel
-        // 1, the only channel of the injected group. That group has its own data register, so the two cannot be
-        // confused. SAFETY: a channel number in its field.
+        // Channel 0 is converted once, as after a reset of SQR1 to SQR3. The conversion of channel 1, the only
+        // channel of the injected group, follows automatically. That group has its own data register, so the two
+        // cannot be confused. SAFETY: a channel number in its field.
         converter
             .jsqr()
             .write(|w| unsafe { w.jl().bits(0).jsq4().bits(1) });

@@ -37,7 +37,7 @@ impl Uart {
         let _ = (tx.into_alternate::<7>(), rx.into_alternate::<7>());
         USART2::enable(rcc);
         USART2::reset(rcc);
-        // `None` on a second call: there is one line.
+        // A second call gives `None`, because there is one line.
         let queue = cortex_m::singleton!(: Queue<u8, WAITING> = Queue::new());
         let received = queue.map(|queue| {
             let (producer, consumer) = queue.split();

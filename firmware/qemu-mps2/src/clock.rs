@@ -26,7 +26,7 @@ impl Ticks {
             overhead: 0,
             due: SYST::get_current(),
         };
-        // The first measurement warms the code.
+        // The first measurement is discarded, because it runs new code.
         ticks.measure(|| ());
         ticks.overhead = ticks.measure(|| ()).1;
         ticks

@@ -4,7 +4,7 @@ use wire::Outbox;
 
 const SEND_FULL: u32 = 1;
 const RECEIVED: u32 = 2;
-/// Duration of a byte at 115 200 baud, 8N1, in µs · 11 520.
+/// Duration of a byte at 115 200 baud, 8N1, in units of 1/11 520 µs.
 const A_BYTE: u32 = 1_000_000;
 const BYTES_A_SECOND: u32 = 11_520;
 
@@ -15,7 +15,7 @@ pub type ToRig = Uart<0x4000_5000>;
 
 /// A serial line. Exclusive: each is made from a token that exists once.
 pub struct Uart<const BASE: usize> {
-    /// Transmission credit, in µs · 11 520.
+    /// Transmission credit, in units of 1/11 520 µs.
     credit: u32,
 }
 

@@ -1,7 +1,7 @@
 //! The desk: the operator's lines and the host's frames on one serial line.
 //!
-//! A byte 0 begins a frame. While frames arrive, operator's lines are ignored except `disarm`, which always counts.
-//! After the link's timeout without frames, operator's lines are accepted again.
+//! A byte 0 begins a frame. While frames arrive, operator's lines are ignored except `disarm`, which is always
+//! executed. After the link's timeout without frames, operator's lines are accepted again.
 //!
 //! The loop never waits for the line: output goes into an [`Outbox`], completely or not at all, and a sample that
 //! does not fit is counted.

@@ -1,9 +1,9 @@
 //! The dialogue between host and board: the host sends readings, the board
 //! answers with predictions and decisions.
 //!
-//! Every request carries a number and is answered by exactly one reply with the same number. A request that comes
-//! again (its reply was lost) gets the same reply and is not executed twice. A damaged request is reported, and the
-//! host sends it again. A lost byte is therefore either recovered or reported; the two sides never lose step.
+//! Every request carries a number and is answered by exactly one reply with the same number. A request that comes again
+//! (its reply was lost) gets the same reply and is not executed twice. A damaged request is reported, and the host
+//! sends it again. A lost byte is therefore either recovered or reported; the two sides are always at the same step.
 //!
 //! | request | content after kind (1 byte) and number (2 bytes, low first) | reply's content after the same |
 //! |---|---|---|
@@ -136,7 +136,7 @@ impl<C: Cases> Server<C> {
                     [low, high] => u16::from_le_bytes([*low, *high]),
                     _ => 0,
                 });
-                // Constant over the batch, because channels are slow.
+                // The channel counts as constant over the batch, because channels are slow.
                 let channel = counts.next().unwrap_or(0);
                 for (i, counts) in counts.take(BATCH).enumerate() {
                     let (predicted, open) = self.cases.step(counts, channel);

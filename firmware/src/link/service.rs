@@ -260,7 +260,7 @@ impl Service {
                 not_disarmed(controller)
             }
             Ask::Stream => Ok(()),
-            // The valve has been shut by the pause; it has to stay so for its shortest time.
+            // The valve has been shut by the pause; it has to stay shut for its shortest time.
             Ask::Arm
                 if controller.mode() == Mode::Paused
                     && self.shut < controller.settings().hold.of(false) =>
@@ -291,7 +291,7 @@ impl Service {
             samples: controller.samples(),
         };
         let session = match &mut self.session {
-            // A disarm by another host.
+            // The request is a disarm by another host.
             Some(session) if session.name != request.session => return done,
             Some(session) => session,
             none => none.insert(Session {

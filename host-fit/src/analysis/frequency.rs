@@ -62,9 +62,10 @@ const NEIGHBOURS: [f64; 2] = [4.0 / 9.0, 1.0 / 36.0];
 /// Share of the largest density of the command below which it does not count as excitation.
 const EXCITED: f64 = 1e-9;
 
-/// The frequency response of `model`, linearised at a level of the step response ([`step_response`](super::step_response)):
-/// at rest (`command` 0), or in the steady blown state (`command` 1). With its effects; from 1/`longest_s` (or the inverse of
-/// the settling time, if that is longer) to half the sampling rate.
+/// The frequency response of `model`, linearised at a level of the step response
+/// ([`step_response`](super::step_response)): at rest (`command` 0), or in the steady blown state (`command` 1). The
+/// effects of the model are included. The frequencies go from 1/`longest_s` (or the inverse of the settling time, if
+/// that is longer) to half the sampling rate.
 ///
 /// None if there is no step response, or if the model is not linear for small changes at this level.
 #[must_use]
@@ -76,10 +77,11 @@ pub fn frequency_response(model: &Model, command: u8, longest_s: f64) -> Option<
     let dead_time = impulse.iter().position(|g| g.abs() > 1e-9 * most)?;
     let period = model.sample_period_s;
     let wanted = (longest_s / period).min(LONGEST as f64 / 4.0) as usize;
-    // Four times as long as the response: the phase then turns by less than 90° from line to line.
+    // The transform is four times as long as the response, so that the phase turns by less than 90°
+    // from line to line.
     let length = 4 * impulse.len().max(wanted);
     let length = length.next_power_of_two();
-    // Without its dead time, which is added to the phase afterwards.
+    // The response is transformed without its dead time, which is added to the phase afterwards.
     let mut input = impulse.get(dead_time..)?.to_vec();
     input.resize(length, 0.0);
     let transform = RealFftPlanner::new().plan_fft_forward(length);
@@ -111,15 +113,15 @@ pub fn frequency_response(model: &Model, command: u8, longest_s: f64) -> Option<
     })
 }
 
-/// Estimates Σ U*Y / Σ |U|² of the frequency response of measured y and of the model's free run, in bands of frequency; sums
-/// over segments ([Welch](super::spectrum())) and over the lines of a band. Only bands in which u and y are coherent at the 5 %
-/// level.
+/// Estimates Σ U*Y / Σ |U|² of the frequency response of measured y and of the model's free run, in bands of frequency;
+/// sums over segments ([Welch](super::spectrum())) and over the lines of a band. Only bands in which u and y are
+/// coherent at the 5 % level are given.
 ///
-/// For a plant that is not linear this is its best linear approximation under the command of the records; the remainder counts
-/// as noise. Limits are those of the random error, s.d. of ln |G| and of the phase √((1 − γ²)/(2 (n − 1) γ²)) with the
-/// coherence γ² and n independent averages (Bendat and Piersol, Random Data, 4th ed., §9.2), with Student's t. `full` is the
-/// change of u for a full jet. `dead_time` in samples is taken out before a band is averaged, so that a turning phase does not
-/// lower the magnitude, and is put back.
+/// For a plant that is not linear this is its best linear approximation under the command of the records; the remainder
+/// counts as noise. Limits are those of the random error, s.d. of ln |G| and of the phase √((1 − γ²)/(2 (n − 1) γ²))
+/// with the coherence γ² and n independent averages (Bendat and Piersol, Random Data, 4th ed., §9.2), with Student's t.
+/// `full` is the change of u for a full jet. The phase of `dead_time` (samples) is removed before a band is averaged,
+/// because a phase that varies within the band would lower the magnitude, and is added again afterwards.
 #[must_use]
 pub fn estimated_response(residuals: &Residuals, full: f64, dead_time: usize) -> Vec<Estimate> {
     let Some(segments) = Segments::of(residuals) else {
@@ -243,7 +245,7 @@ fn degrees(value: Complex<f64>) -> f64 {
     value.arg().to_degrees()
 }
 
-/// `phase` plus the multiple of 360° that is nearest to `near`, degrees.
+/// The angle nearest to `near` among `phase` and its sums with multiples of 360°, degrees.
 fn nearest(phase: f64, near: f64) -> f64 {
     phase + 360.0 * ((near - phase) / 360.0).round()
 }
@@ -355,7 +357,8 @@ mod tests {
         let (mut gain, mut phase, mut all) = (0.0, 0.0, 0.0);
         for _ in 0..60 {
             let found = estimated_response(&residuals(&mut rng, 1.0), 1.0, 31);
-            // Bands that are coherent with any noise; others are shown if noise adds to the coherence.
+            // Bands below 2.5 Hz are coherent whatever the noise is; the others appear only if the
+            // noise happens to add to the coherence.
             for point in found.iter().filter(|point| point.measured.hz < 2.5) {
                 // The same estimate without noise is the truth apart from the resolution.
                 let exact = point.run;

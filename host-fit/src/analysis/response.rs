@@ -65,7 +65,8 @@ pub fn step_response(model: &Model) -> Option<StepResponse> {
 /// The response of `model` to a small step of the command at a level of [`step_response`]: rest (`command` 0) or the
 /// steady blown state (`command` 1). Change of y per full jet, from the sample of the step on, until it has settled.
 ///
-/// None as for [`step_response`], if y does not settle, or if the response is not proportional to a small step.
+/// None if there is no [`step_response`], if y does not settle, or if the response is not proportional to a small
+/// step.
 pub(super) fn small_step(model: &Model, command: u8) -> Option<Vec<f64>> {
     let level = f64::from(command);
     let mut reach = reach(model)?;
@@ -73,7 +74,7 @@ pub(super) fn small_step(model: &Model, command: u8) -> Option<Vec<f64>> {
         let lead = [(reach / 4, 0.0), (reach, level)];
         let held = run(model, &[lead[0], lead[1], (reach, level)])?;
         let after = |size: f64| {
-            // Between 0 and 1: upwards from rest, downwards from the full jet.
+            // The steps stay between 0 and 1: upwards from rest, downwards from the full jet.
             let size = if command == 0 { size } else { -size };
             let moved = run(model, &[lead[0], lead[1], (reach, level + size)])?;
             let change = moved.iter().zip(&held).skip(reach / 4 + reach);
@@ -198,7 +199,7 @@ mod tests {
 
     #[test]
     fn an_oscillation_has_its_frequency_and_damping() {
-        // s = −5 ± 2π·20 j, sampled at 1 kHz.
+        // The poles s = −5 ± 2π·20 j are sampled at 1 kHz.
         let (decay, turn) = (-5.0_f64, std::f64::consts::TAU * 20.0);
         let r = (decay * 0.001).exp();
         let model = Model {

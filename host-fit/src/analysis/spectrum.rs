@@ -69,7 +69,7 @@ impl Segments {
                 .map(|(v, w)| (v - mean) * w)
                 .collect();
             let mut lines = self.transform.make_output_vec();
-            // Cannot fail: the transform was planned for this length.
+            // This cannot fail, because the transform was planned for this length.
             let _ = self.transform.process(&mut input, &mut lines);
             lines
         })

@@ -98,7 +98,7 @@ impl Arx {
             }
             out
         };
-        // Sum and difference: nearly orthogonal at a high sampling rate.
+        // Sum and difference of the two states are nearly orthogonal at a high sampling rate.
         vec![column(1.0, 1.0), column(0.5, -0.5)]
     }
 
@@ -140,8 +140,8 @@ fn least_squares(series: &[Series], delay: usize) -> Option<Arx> {
         for (k, y) in stretch.y.windows(3).enumerate().skip(judged) {
             let &[before, last, now] = y else { continue };
             let (new, old) = (at(k + 2, delay), at(k + 2, delay + 1));
-            // Differences, because neighbouring samples are nearly equal; y relative to the last y for the
-            // same reason.
+            // Differences are used, because neighbouring samples are nearly equal. For the same reason y
+            // is taken relative to the last y.
             let row = [last, last - before, new, new - old, 1.0, now - last];
             for i in 0..N {
                 for j in 0..=i {
@@ -169,7 +169,7 @@ fn least_squares(series: &[Series], delay: usize) -> Option<Arx> {
     arx.is_stable().then_some(arx)
 }
 
-/// Second orders with the poles of an ARX(2,2), for a few delays.
+/// Second-order shapes with the poles of an ARX(2,2) model, one for each of a few delays.
 pub(super) fn shapes(series: &[Series]) -> Vec<Shape> {
     let mut shapes = Vec::new();
     for delay in [0, 1, 3, 8, 20] {

@@ -45,7 +45,8 @@ impl InitialState {
         known: Range<usize>,
     ) -> Self {
         let mut beginning = FEWEST.max((SHARE * samples as f64) as usize);
-        // Doubled, so that it does not change with small changes of the time constant.
+        // The interval is doubled, so that it does not change with small changes of the time
+        // constant.
         while (beginning as f64) < (LONGEST * samples as f64).min(2.0 * fastest) {
             beginning *= 2;
         }
@@ -56,7 +57,7 @@ impl InitialState {
         };
         for mut column in free {
             let size = new.over_the_beginning(&column, &column).sqrt();
-            // Gram–Schmidt, twice for nearly parallel columns.
+            // Gram–Schmidt is applied twice, because columns may be nearly parallel.
             for _ in 0..2 {
                 new.remove_from(&mut column);
             }

@@ -15,7 +15,7 @@ const SLOWEST: f64 = 30.0;
 /// Starting points from which a descent is made.
 const DESCENTS: usize = 3;
 
-/// Shorter time constants, in samples, are not visible in a sampled response.
+/// Time constants below this, in samples, are not visible in a sampled response.
 const NO_TIME: f64 = 0.05;
 
 /// T·y′ + y = level + gain·u(t − dead time).
@@ -118,7 +118,7 @@ fn static_part(fitted: &Fitted, scaling: &Scaling) -> (f64, f64) {
 /// The free run of a process over a record.
 fn run(shape: Shape, dead_time: f64, level: f64, gain: f64, record: &Record) -> Option<Vec<f64>> {
     let response = Response::new(shape, dead_time);
-    // Computed about the mean, to avoid denormal numbers in a decaying response.
+    // The run is computed about the mean, to avoid denormal numbers in a decaying response.
     let mean = record.u.iter().sum::<f64>() / record.len().max(1) as f64;
     let around: Vec<f64> = record.u.iter().map(|u| u - mean).collect();
     let before = command_before(record) - mean;

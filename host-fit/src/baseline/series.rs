@@ -1,4 +1,4 @@
-//! Records in units of their own scatter, whole or thinned out for the search of starts.
+//! Records scaled by their own scatter, whole or decimated for the search of starting points.
 
 use crate::data::Record;
 
@@ -11,7 +11,7 @@ pub(super) struct Scaling {
     pub(super) y_scale: f64,
 }
 
-/// A stretch of a record, scaled.
+/// An interval of a record, scaled.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Series {
     pub(super) u: Vec<f64>,
@@ -68,8 +68,8 @@ impl Series {
         self.y.len()
     }
 
-    /// One sample of `factor` original ones: u averaged over the time that it is held, y over an equally long
-    /// interval around the instant.
+    /// Decimates the series; one sample replaces `factor` original ones: u averaged over the time that it is
+    /// held, y over an equally long interval around the instant.
     pub(super) fn thinned(&self, factor: usize) -> Self {
         if factor <= 1 {
             return self.clone();

@@ -11,13 +11,13 @@ use crate::order;
 const BUDGET: usize = 4000;
 /// Largest number of records in a scan.
 const RECORDS: usize = 20;
-/// Dead times of a scan, thinned samples.
+/// Dead times of a scan, decimated samples.
 const DEAD_TIMES: usize = 150;
 /// Factor from one time scale to the next.
 const SCALE: usize = 4;
 /// Smallest number of decimated samples of the longest record.
 const SHORTEST: usize = 60;
-/// Time constants of a scan, thinned samples, and further ones that only the coarsest scan tries.
+/// Time constants of a scan, decimated samples, and further ones that only the coarsest scan tries.
 const TIMES: [f64; 5] = [0.5, 1.0, 2.0, 4.0, 8.0];
 const LONG_TIMES: [f64; 5] = [16.0, 32.0, 64.0, 128.0, 256.0];
 const DAMPINGS: [f64; 5] = [0.05, 0.2, 0.5, 1.0, 2.5];

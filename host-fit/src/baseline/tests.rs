@@ -37,7 +37,8 @@ fn command(samples: usize, mean_time: f64, noise: &mut Noise) -> Vec<f64> {
     u
 }
 
-/// Small Euler steps of two lags in series behind a dead time of whole samples, as an independent simulation.
+/// Independent simulation with small Euler steps: a dead time of whole samples, then two first-order lags in
+/// series.
 fn simulated(u: &[f64], slow: f64, fast: f64, dead: usize, level: f64, gain: f64) -> Vec<f64> {
     const STEPS: usize = 400;
     let (mut first, mut second) = (u[0], u[0]);
@@ -295,7 +296,8 @@ fn fits(learned: &[&Record], judged: &[&Record]) -> (Baselines, BaselineFits) {
     (found, fits)
 }
 
-/// The numbers of `strangers`, computed elsewhere by least squares.
+/// The FIT agrees with the values in `strangers`, which were computed independently by least
+/// squares.
 #[test]
 fn records_of_strangers_have_the_published_fits() {
     let Some(folder) = beside("strangers") else {

@@ -116,7 +116,7 @@ pub fn check(model: &Model) -> Result<(), BoardError> {
 pub fn loop_bytes(model: &Model, law: &Law) -> usize {
     let state: usize = parts(model).iter().map(|(_, _, bytes, _)| bytes).sum();
     let law = match law {
-        // The law's own model, and its prediction horizon in samples.
+        // The law stores its own model, and 12 bytes for each sample of its prediction horizon.
         Law::Track(track) => state + 12 * usize::from(track.look_ahead),
         // The averaged readings.
         Law::Maximise(_) => 8 * model.averaging.window as usize,

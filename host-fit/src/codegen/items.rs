@@ -162,7 +162,8 @@ fn path(text: &str) -> Result<TokenStream, CodegenError> {
     })
 }
 
-/// Samples of memory of an effect whose memory is as long as the parameter with index `time`.
+/// Number of samples that an effect stores if its memory lasts as long as its parameter with index
+/// `time`.
 pub(super) fn buffer(model: &Model, added: &Added, time: usize) -> usize {
     let time = added.parameters.get(time).copied().unwrap_or(0.0) / model.sample_period_s;
     (time as usize).saturating_add(3).min(LONGEST_BUFFER)

@@ -270,7 +270,7 @@ fn header_lines(model: &Model) -> Vec<String> {
 /// Checksum and reference run, computed by the code of the host's simulation.
 fn golden(model: &Model, memory: &Footprint) -> Result<TokenStream, CodegenError> {
     let prepared = model.prepare::<f32>();
-    // Twice as long as the longest delay.
+    // The run is twice as long as the longest lag or delay.
     let longest = model.longest_lag().max(model.longest_delay());
     let every = (2 * longest).div_ceil(GOLDEN_VALUES).clamp(32, 4096) as u32;
     let mut values = Vec::with_capacity(GOLDEN_VALUES);

@@ -17,12 +17,12 @@ pub(super) fn lags(values: &[u16]) -> TokenStream {
     quote!([#(#values),*])
 }
 
-/// A count without a suffix.
+/// A whole number as a literal without a type suffix.
 pub(super) fn count(value: usize) -> Literal {
     Literal::usize_unsuffixed(value)
 }
 
-/// A word of 32 bits, in the form in which it is compared.
+/// A word of 32 bits as a hexadecimal literal.
 pub(super) fn word(value: u32) -> Literal {
     let text = format!("0x{:04x}_{:04x}", value >> 16, value & 0xffff);
     text.parse()

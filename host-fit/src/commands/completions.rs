@@ -34,7 +34,8 @@ pub(crate) fn run(args: &Args, mut command: clap::Command, console: Console) -> 
         let shell = args.shell.to_string();
         return console.document(&serde_json::json!({ "shell": shell, "script": script }));
     }
-    // Printed without escaping, because scripts contain characters that are otherwise hidden from a terminal.
+    // The script is printed without escaping, because it contains characters that are otherwise hidden from a
+    // terminal.
     let mut out = io::stdout().lock();
     match out.write_all(script.as_bytes()).and_then(|()| out.flush()) {
         Err(e) if e.kind() == io::ErrorKind::BrokenPipe => Ok(()),

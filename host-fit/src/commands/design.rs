@@ -144,7 +144,7 @@ fn some_time(text: &str) -> Result<TimeSpan, String> {
 fn at_period(option: &str, time: TimeSpan, period_s: f64) -> anyhow::Result<f64> {
     match time {
         TimeSpan::Samples(samples) => Ok(f64::from(samples) * period_s),
-        // A tolerance of 1/1000 for rounded printed values.
+        // The tolerance of 1/1000 is for printed values that were rounded.
         TimeSpan::Seconds(seconds) if seconds > 0.0 && seconds < 0.999 * period_s => bail!(
             "{option} {seconds} s is shorter than the model's sample period, {period_s} s (key `sample_period_s`), \
              and the loop switches at most once per sample. Give {option} {period_s} or more, or {option} 0 if the \
@@ -175,7 +175,7 @@ impl ShortestTime<'_> {
             return Ok(known.unwrap_or(USUAL_VALVE_S));
         };
         let asked = at_period(option, asked, period_s)?;
-        // Half a sample of tolerance for rounding.
+        // The tolerance of half a sample is for rounding.
         match known {
             Some(known) if asked < known - 0.5 * period_s => {
                 let known = (known * 1e6).round() * 1e-6;

@@ -81,7 +81,7 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
     let options = args.prepare(&mut model)?;
     let mut found = steps::discover(&model, &set, &options, &console.watch())?;
     found.answer = match &args.output {
-        // The model is written: it can be compared.
+        // The model is written, so it can be compared.
         Some(path) if !found.answer.next.is_empty() => {
             let compare = "host-fit compare model.toml DATASET --report report.html";
             let data = shell_word(args.from.dataset());

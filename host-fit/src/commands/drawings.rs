@@ -130,7 +130,7 @@ pub(crate) fn proof_picture(proof: &Proof, tracks: bool) -> Picture {
         air: true,
         reference: &reference,
         runs: &runs,
-        // A quarter of a trial, so that single pulses are visible.
+        // The picture shows a quarter of a trial, so that single pulses are visible.
         seconds: 0.25 * proof.trace.samples.len() as f64 * proof.trace.sample_period_s,
     })
 }

@@ -18,8 +18,8 @@ use super::{Console, check_outputs, page};
 
 /// Identify a model: structure chosen by validation error, or with given numbers of lags.
 ///
-/// With given numbers of lags, the delays are found by search (MADS), and the coefficients by least squares within
-/// it.
+/// With given numbers of lags, the delays are found by search (MADS), and for each candidate the coefficients by
+/// least squares.
 ///
 /// With the objective `free-run` the coefficients are then refined on the free run, and kept if the validation
 /// error falls.

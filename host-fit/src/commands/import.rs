@@ -83,7 +83,7 @@ pub(crate) struct Args {
     #[arg(long, value_name = "NAME")]
     validate: Vec<String>,
     /// Split each record at this time, s: the samples after it are a validation record, the samples before it
-    /// its lead-in.
+    /// are its lead-in.
     #[arg(long, value_name = "SECONDS")]
     hold_out_from: Option<f64>,
     /// The input has levels between off and on.

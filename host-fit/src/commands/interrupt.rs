@@ -1,4 +1,5 @@
-//! Ctrl-C: the first requests the best result so far from a command, the second ends it.
+//! Ctrl-C: the first press requests the best result so far from a command, the second press ends
+//! the command.
 
 use std::sync::Once;
 use std::sync::atomic::{AtomicBool, Ordering};

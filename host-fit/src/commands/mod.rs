@@ -68,8 +68,8 @@ impl Console {
     ) -> anyhow::Result<()> {
         #[derive(Serialize)]
         struct Document<'a, T> {
-            /// The paths are stored as text, because JSON strings are UTF-8. A name that is not UTF-8 is not
-            /// refused.
+            /// The paths are stored as text, because JSON strings are UTF-8. A file name with other bytes is
+            /// still accepted.
             #[serde(flatten)]
             files: BTreeMap<&'a str, Cow<'a, str>>,
             #[serde(flatten)]
@@ -116,7 +116,7 @@ impl Console {
         if let Ok(style) = ProgressStyle::with_template(template) {
             bar.set_style(style);
         }
-        // Ticks need their own thread.
+        // The ticks of a progress bar need their own thread.
         if threads::are_given() {
             bar.enable_steady_tick(Duration::from_millis(200));
         }

@@ -456,7 +456,7 @@ pub(super) fn term_picture(term: &FoundTerm) -> Picture {
     curve(&CurvePlot {
         title: "",
         x_label: &format!("{} ({})", term.coordinate, term.coordinate_unit),
-        // Shortened, because the heading has the full name and the axis is short.
+        // The label is shortened, because the axis is short and the heading has the full name.
         y_label: &format!(
             "{} ({})",
             term.changes.split(" of ").next().unwrap_or_default(),
@@ -519,7 +519,8 @@ pub(crate) fn report_climb(
     let mut runs: Vec<(&str, &[Vec<f64>])> = Vec::new();
     let before = found.runs_before.as_deref();
     runs.extend(before.map(|before| ("as given", before)));
-    // Added before the intermediate steps, so that a model has the same colour in every picture.
+    // The final model is added before the intermediate steps, so that a model has the same colour
+    // in every picture.
     let after = found.runs.as_deref();
     runs.extend(after.map(|after| (after_label(found), after)));
     let first = runs.len();

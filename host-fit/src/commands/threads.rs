@@ -34,7 +34,7 @@ pub(crate) fn are_given() -> bool {
 pub(crate) fn or_one() {
     if !are_given() {
         let one = rayon::ThreadPoolBuilder::new().num_threads(1);
-        // Fails only if a pool exists already; this is the first one.
+        // This fails only if a thread pool exists already, and this is the first one.
         let _ = one.use_current_thread().build_global();
     }
 }

@@ -60,7 +60,7 @@ impl Tried {
         }
     }
 
-    /// With the answer: whether the law keeps attachment, in which trials, with which margin.
+    /// Adds the answer: whether the law keeps attachment, in which trials, and with which margin.
     pub(super) fn answered(self) -> Self {
         let answer = self.concluded();
         Self { answer, ..self }
@@ -70,7 +70,7 @@ impl Tried {
         let verdict = self.verdict();
         let mut lines = verdict.lines();
         let evidence = lines.next().unwrap_or_default();
-        // For a tracking law: its errors on the model without noise.
+        // For a tracking law, the evidence is its errors on the model without noise.
         let tracks = matches!(self.design.outcome, DesignOutcome::Track(_));
         let model = self.proof.cases.first().filter(|_| tracks);
         let settles = model.is_none_or(|case| case.figures.settling_s.is_some());

@@ -46,7 +46,7 @@ pub(crate) struct Args {
     /// Length of a block, s; several correlation times of the noise.
     #[arg(long, value_name = "SECONDS", default_value_t = 1.0, value_parser = block)]
     block: f64,
-    /// Number of blocks of the baseline.
+    /// Number of blocks of the baseline, before the first test.
     #[arg(long, default_value_t = 60, value_parser = clap::value_parser!(u32).range(3..=10_000))]
     learn: u32,
     /// Largest probability of a false alarm in a year of operation.
@@ -163,7 +163,7 @@ fn order(line: &str) -> Result<Order, String> {
 /// The lines of standard input, as they come.
 fn typed() -> Receiver<String> {
     let (sender, receiver) = channel();
-    // Ends with the program: a read of a terminal cannot be interrupted.
+    // This thread ends with the program, because a read of a terminal cannot be interrupted.
     std::thread::spawn(move || {
         for line in std::io::stdin().lines().map_while(Result::ok) {
             if sender.send(line).is_err() {

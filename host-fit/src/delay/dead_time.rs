@@ -180,7 +180,7 @@ pub(crate) fn dead_time(
     let all: Vec<&Refined> = fits.iter().chain(&thirds).collect();
     let best = all[of_least_error(&all)?];
     let noise = widened_variance(&best.at);
-    // h, ln S and the further parameters that are integrated.
+    // The parameters that are integrated: h, ln S and the further ones of an order.
     let component = |fit: &Refined, integrated: usize, log_prior: f64| -> Option<Component> {
         let covariance = fit.covariance(noise)?;
         let stride = covariance.len().isqrt();
@@ -220,7 +220,8 @@ pub(crate) fn dead_time(
         None => (0.01, 0.3),
     };
     let start = second.unwrap_or(first).at.plant;
-    // Without third lags, b has half of the prior; with them, half of that each for the second and the third order.
+    // Without third lags, the second order has half of the prior. With them, the second and the third order have a
+    // quarter each.
     let of_second = if thirds.is_empty() { 1.0 } else { 2.0 };
     for direction in [1.0, -1.0] {
         let mut at = start;

@@ -115,15 +115,16 @@ fn direction_test(points: &[DelayPoint]) -> Option<(f64, f64)> {
     let (_, with) = best_rate(points, None, true)?;
     let (_, without) = best_rate(points, None, false)?;
     let free = points.len().checked_sub(4).filter(|f| *f > 0)? as f64;
-    // The t value of one coefficient is the root of the F value of leaving it out.
+    // The t value of one coefficient is the square root of the F value for the fit without this
+    // coefficient.
     let t = ((without.rss - with.rss).max(0.0) * free / with.rss.max(f64::MIN_POSITIVE)).sqrt();
     let p = 2.0 * StudentsT::new(0.0, 1.0, free).ok()?.cdf(-t);
     Some((p, with.linear.get(2).copied()?))
 }
 
 /// Permutation test: probability that a law fits as well when the delays are randomly reassigned to the ỹ.
-/// With `within`, only among edges of one direction, whose means are removed first. Exact for any noise and
-/// any number of rates tried.
+/// With `within`, the delays of rising edges and those of falling edges are reassigned separately, after
+/// the mean of each group is removed. The test is exact for any noise and any number of rates tried.
 fn permutation_test(points: &[DelayPoint], within: bool, seed: u64) -> Option<f64> {
     let groups: Vec<Vec<usize>> = if within {
         [true, false]
@@ -310,7 +311,8 @@ mod tests {
                 *count += u32::from(p.unwrap() < 0.05);
             }
         }
-        // 15 expected of 300; 5–28 is ± 3.3 standard deviations.
+        // In 300 runs, 15 false alarms are expected; 5 to 28 is a range of ± 3.3 standard
+        // deviations.
         assert!(
             alarms.iter().all(|a| (5..=28).contains(a)),
             "{alarms:?} of {runs}"

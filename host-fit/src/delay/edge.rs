@@ -12,8 +12,9 @@ pub struct Edge {
     pub rising: bool,
 }
 
-/// Indices (in `switching.changes`) and edges of the changes that count: all of an on/off command; of a
-/// graded one those of at least the rule's share of its `range`.
+/// The changes of the command that count as edges, with their indices in `switching.changes`. Every
+/// change of an on/off command counts; a change of a graded command counts if it is at least the rule's
+/// share of the `range`.
 pub(crate) fn edges(switching: &Switching, range: f64) -> Vec<(usize, Edge)> {
     let least = RULES.smallest_edge * range;
     let mut last = 0.0;

@@ -35,8 +35,9 @@ struct Case {
     record: Record,
 }
 
-/// First or second order, time constants 5 to 400 samples, dead time 0 to 100, 1 to 40 edges on/off or graded, either
-/// sign, resting at any level, at rest with u = 0 or 1 or in mid-run, noise 0.1 to 3 % of the step, quantised or not.
+/// A random test case: first or second order, time constants 5 to 400 samples, dead time 0 to 100, 1 to 40 edges
+/// on/off or graded, either sign, resting at any level, at rest with u = 0 or 1 or in mid-run, noise 0.1 to 3 % of
+/// the step, quantised or not.
 fn case(seed: u64, period: f64) -> Case {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let t1 = 5.0 * 80f64.powf(rng.random());
@@ -267,7 +268,8 @@ fn a_rig_sampled_at_ten_milliseconds_is_measured_at_nearly_every_edge() {
                 u.extend(std::iter::repeat_n(level, rng.random_range(8..18)));
             }
             u.truncate(1200);
-            // h = 3 + 2·exp(−4·y) samples, different rates, and a gain that decreases during blowing.
+            // The plant has h = 3 + 2·exp(−4·y) samples, different rates of attachment and
+            // separation, and a gain that decreases during blowing.
             let steps = 20;
             let (mut value, mut store): (f64, f64) = (0.0, 1.0);
             let y = (0..u.len())
@@ -383,7 +385,8 @@ fn nothing_that_moves_gives_edges_without_a_dead_time() {
     assert!(noisy.dead_time.is_none(), "{:?}", noisy.dead_time);
 }
 
-/// A command of 2000 samples that is held for 30 to 170, and a normal deviate for each sample.
+/// A command of 2000 samples whose levels last 30 to 170 samples, and a normal deviate for each
+/// sample.
 fn switched(seed: u64) -> (Vec<f64>, Vec<f64>) {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let (mut u, mut level) = (vec![0.0; 60], 0.0);

@@ -96,7 +96,7 @@ pub(crate) fn expect(
             if mine.is_empty() {
                 return None;
             }
-            // The front lies up to `reach` after its start.
+            // The front lies up to `reach` samples after the start of a response.
             let vote = |delay: usize| {
                 let seen = mine
                     .iter()
@@ -185,7 +185,7 @@ fn gain_sign(series: &[(&[f64], Vec<Edge>)]) -> f64 {
 }
 
 /// Mean of y over the `reach` samples from each sample on, minus the mean over the `reach` samples before it.
-/// Before the record y is 0; at its end the filter ends.
+/// Before the record y is 0. The last `reach` samples of the record get no value.
 pub(crate) fn level_filter(y: &[f64], reach: usize) -> Vec<f64> {
     let mut sums = Vec::with_capacity(y.len() + 1);
     let mut total = 0.0;

@@ -442,7 +442,7 @@ mod tests {
         }
         for count in covered {
             let share = f64::from(count) / runs as f64;
-            // 0.95 ± 2.75 standard deviations.
+            // The tolerance of 0.03 is 2.75 standard deviations.
             assert!((share - 0.95).abs() < 0.03, "{covered:?} of {runs}");
         }
     }

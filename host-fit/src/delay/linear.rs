@@ -21,15 +21,16 @@ const COARSE_STEP: f64 = 1.5;
 const COARSE_RATIOS: [f64; 2] = [0.0, 0.2];
 /// Number of grid minima, over the time constants, that are refined.
 const COARSE_STARTS: usize = 3;
-/// Time constant of a response within one sample, samples, and delays before it that the grid search tries.
+/// Time constant of a response within one sample, in samples, and number of delays that the grid search
+/// tries with it.
 const IMMEDIATE: f64 = 0.2;
 const IMMEDIATE_DELAYS: usize = 300;
-/// Largest ratio: damping ratio 0.05.
+/// Largest ratio b, at which the damping ratio is 0.05.
 pub(crate) const LARGEST_RATIO: f64 = 100.0;
 /// Ratios from which a second order starts.
 const STARTS: [f64; 3] = [0.02, 0.1, 0.25];
-/// Prior standard deviations of ln S and b around the fit: its linearisation holds within a factor e of S and over the
-/// ratios of two lags in series.
+/// Prior standard deviations of ln S and b around the fit. The linearisation at the fit is valid within a factor e of
+/// S, and over the ratios b of two lags in series.
 const SCALES: [f64; 2] = [1.0, 0.15];
 /// Steps of Levenberg–Marquardt.
 const STEPS: usize = 40;
@@ -143,7 +144,7 @@ impl Series {
         for mut column in std::iter::once(vec![1.0; n]).chain(plant.free(&self.switching, n)) {
             self.counted(&mut column);
             let before = dot(&column, &column);
-            // Repeated once to remove rounding errors.
+            // The projection is repeated once to remove rounding errors.
             for _ in 0..2 {
                 remove(&basis, &mut column);
             }
@@ -441,7 +442,8 @@ pub(crate) fn refine(
     let mut information = Vec::new();
     for step in 0..STEPS {
         let plant = at.plant;
-        // Steps of the difference quotients; backward differences near a bound.
+        // These are the steps of the difference quotients. Near a bound, backward differences are
+        // used.
         let delta_h = 1e-3 * plant.mean_sum().clamp(1.0, 100.0);
         let deltas = [
             if plant.mean_delay() + delta_h > max_delay {

@@ -3,8 +3,8 @@
 //! On the *trajectory* of one plant through the record, one edge is moved in time. The best shift d of its response,
 //! K·Δu·(s(t − a − d) − s(t − a)), explains the residual around the edge, together with an offset. In a *window* an
 //! edge has its own level, initial state and gain, and shares only the time constants with the other edges. The time
-//! constants are searched in the windows too, because a fit with one dead time takes differences of dead times between
-//! edges for a second time constant.
+//! constants are searched in the windows too, because a fit with one dead time describes different dead times of the
+//! edges by a second time constant.
 
 use super::linear::{Series, evaluate, prewhiten};
 use super::onset::Unmeasured;
@@ -289,7 +289,8 @@ pub(crate) fn by_window(
         .collect();
     let mut plant = pooled.plant;
     let mut measured: Vec<Vec<Option<Measured>>> = Vec::new();
-    // Two passes: the neighbouring responses limit a window, and in the first pass they are known only roughly.
+    // Two passes are needed, because the neighbouring responses limit a window and are known only roughly in
+    // the first pass.
     for _ in 0..2 {
         let windows: Vec<Vec<Option<Window<'_>>>> = all
             .iter()
@@ -323,7 +324,7 @@ pub(crate) fn by_window(
             }
         }
     }
-    // One variance for all windows, because a single window has few samples.
+    // All windows have one variance, because a single window has few samples.
     let mut variances: Vec<f64> = measured
         .iter()
         .flatten()
@@ -403,7 +404,7 @@ fn shape(windows: &[&Window<'_>], start: Plant, gain_sign: f64) -> Plant {
     let best = tried.into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
     match (first, best) {
         (Some(first), Some(best)) => {
-            // A second order must improve BIC.
+            // A second order is kept only if it improves BIC.
             let samples = samples.max(2) as f64;
             let gain = samples * (first.0 / best.0.max(f64::MIN_POSITIVE)).ln();
             if gain > samples.ln() { best.1 } else { first.1 }

@@ -3,7 +3,7 @@
 //! [`study_delays`] fits one plant with a dead time to whole records and derives the delay of every edge from it.
 //! If no plant describes the records, it measures when y starts to respond to each edge ([`Onset`]). It pairs the
 //! delays with the averaged output (1) at that time and fits h̃(ỹ) = p0 + p1·exp(−p2·ỹ) to the edges of the
-//! identify records. The law is kept if tests support it. Theory 1.6 has the method.
+//! identify records. The law is kept if tests support it. Theory 1.6 describes the method.
 
 mod begun;
 mod dead_time;

@@ -73,7 +73,8 @@ struct Neighbourhood<'a> {
     y: &'a [f64],
     edge: Edge,
     expected: &'a Expectation,
-    /// First and one past the last sample between the responses to the edges before and after.
+    /// The samples between the responses to the previous and to the next edge: the first one, and
+    /// one past the last.
     earliest: usize,
     latest: usize,
 }
@@ -85,7 +86,7 @@ impl<'a> Neighbourhood<'a> {
         index: usize,
         expected: &'a Expectation,
     ) -> Result<Self, Unmeasured> {
-        // Margin for neighbouring responses that are late or early.
+        // This is a margin for neighbouring responses that are late or early.
         let room = (expected.reach / 4).max(2);
         let start = |e: &Edge| e.sample + expected.of(*e).onset;
         Ok(Self {
@@ -532,7 +533,8 @@ mod tests {
                     StandardNormal.sample(&mut rng),
                     StandardNormal.sample(&mut rng),
                 );
-                // 20 repeats of white noise 0.03 and of 20 ms coloured noise 0.035.
+                // Noise of an average over 20 repeats: white with s.d. 0.03, and coloured with s.d.
+                // 0.035 and a correlation time of 20 ms.
                 coloured = coloured * (-1.0f64 / 20.0).exp()
                     + a * 0.035 / 20f64.sqrt() * (1.0 - (-0.1f64).exp()).sqrt();
                 y + coloured + b * 0.03 / 20f64.sqrt()

@@ -5,9 +5,10 @@
 //! S is the sum of the time constants T₁ + T₂; b = T₁T₂/S². b = 0 is first order, b = ¼ two equal time constants, b
 //! above ¼ an underdamped plant (damping ratio 1/(2√b)). u is held between samples; h need not be a whole number of
 //! samples. S may differ between command on and off, and h between rising and falling edges: the simplest bilinear
-//! plant. It is linear in K, in the level and in the initial state in any case.
+//! plant. The plant is always linear in K, in the level and in the initial state.
 //!
-//! A third lag T₃ in series may follow, by the trapezoidal rule between samples: accurate to 1/(12·T₃²) of a response.
+//! A third lag T₃ in series may follow. It is computed by the trapezoidal rule between samples, with an error of
+//! 1/(12·T₃²) of a response.
 
 /// With a smaller ratio the second time constant counts as 0.
 const FIRST_ORDER: f64 = 1e-5;
@@ -94,7 +95,7 @@ impl Dynamics {
             (decay, decay * time)
         } else if spread > 0.0 {
             let root = spread.sqrt();
-            // The slow pole, computed without a difference of nearly equal numbers.
+            // The slow pole is computed without a difference of nearly equal numbers.
             let slow = (-2.0 * time / (s * (1.0 + root))).exp();
             let fast = (-0.5 * time * (1.0 + root) / bs).exp();
             ((slow + fast) / 2.0, (slow - fast) * bs / root)
@@ -338,7 +339,7 @@ mod tests {
 
     #[test]
     fn a_plant_that_rings_rings() {
-        // Damping ratio ½: the overshoot is exp(−π/√3) = 16.3 %.
+        // At a damping ratio of ½ the overshoot is exp(−π/√3) = 16.3 %.
         let out = response(Plant::linear(0.0, 20.0, 1.0), &[1.0; 400]);
         let highest = out.iter().copied().fold(0.0, f64::max);
         assert!((highest - 1.163).abs() < 0.002, "{highest}");

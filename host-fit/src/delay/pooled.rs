@@ -1,4 +1,5 @@
-//! Fit to all edges of all records: time scales, command before each record, one plant, one dead time.
+//! One plant with one dead time, fitted to all edges of all records, with the time scales and the
+//! command before each record.
 
 use super::dead_time::{DeadTime, correlation_of_neighbours, dead_time, widened_variance};
 use super::linear::{Free, Refined, Series, coarse, evaluate, fit, refine};
@@ -8,7 +9,7 @@ use super::white::white_noise;
 use crate::data::Record;
 use crate::linalg::dot;
 
-/// Samples of the refinement; longer records are thinned as far as the time constants allow.
+/// Samples of the refinement; longer records are decimated as far as the time constants allow.
 const FIT_SAMPLES: usize = 12_000;
 
 /// Result of the pooled fit.
@@ -180,7 +181,8 @@ fn with_directions(series: &[Series], fits: Vec<Refined>, max_delay: f64) -> (Ve
         let Some(best) = next.iter().min_by(|a, b| a.at.rss.total_cmp(&b.at.rss)) else {
             break;
         };
-        // Further parameters that follow a disturbance make the residual whiter: both variances are considered.
+        // Additional parameters may follow a disturbance and make the residual whiter. The geometric mean of
+        // the variances with and without them is used.
         let before = known
             .iter()
             .min_by(|a, b| a.at.rss.total_cmp(&b.at.rss))

@@ -41,8 +41,8 @@ rules! {
     response_shapes: [f64; 17] = [0.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 128.0, 256.0, 3.0, 6.0, 11.0, 22.0, 45.0, 90.0, 180.0, 360.0], "samples", "a geometric grid with a factor of about 1.4, every other value first";
     /// The first search for the start of a response uses only this many of the shapes before and after it.
     coarse_shapes: usize = 9, "", "every other response";
-    /// Largest autocorrelation of neighbouring residuals by which a variance is corrected; a higher one means that
-    /// the motion before the response is not modelled, and that whole records are prewhitened.
+    /// Largest autocorrelation of neighbouring residuals by which a variance is corrected; if it is higher, the
+    /// motion before the response is not modelled, and whole records are prewhitened.
     most_correlation: f64 = 0.82, "", "corresponds to a variance 10 times as large; tested in `onset.rs`";
 
     /// The earliest peak of the likelihood of at least this height, relative to the highest, is the start of the

@@ -277,7 +277,8 @@ impl Measurement {
                 time_constants_off: pooled.plant.sum[1],
                 ratio: pooled.plant.ratio,
             }),
-            // Under a binary sequence no edge is measured separately, but all together are.
+            // Under a binary sequence no edge is measured separately, but the common dead time of
+            // all edges is.
             dead_time: (method == DelayMethod::Trajectory && pooled.responds)
                 .then_some(pooled.dead_time),
             common,
@@ -548,7 +549,7 @@ mod tests {
                 value += (arrived - value) / tau / f64::from(steps);
             }
             y.push(value);
-            // ỹ of the next sample: y_{k−248} … y_k, 249 terms.
+            // ỹ of the next sample is the mean over the 249 terms y_{k−248} … y_k.
             sum += y[k];
             if k >= 249 {
                 sum -= y[k - 249];
@@ -670,7 +671,8 @@ mod tests {
             assert!(values.len() > 100, "{}", values.len());
             spread(&values).mean
         };
-        // Description: half of the response 53–61 samples after rising and 19–21 after falling edges.
+        // Expected: half of the response is reached 53–61 samples after rising edges and 19–21
+        // samples after falling edges.
         let (up, down) = (
             mean(true, &|o| o.half_response),
             mean(false, &|o| o.half_response),

@@ -52,7 +52,8 @@ mod tests {
 
     #[test]
     fn only_single_samples_are_replaced() {
-        // Sums of four, so that the tails are those of a nearly normal distribution.
+        // Sums of four uniform numbers, so that the tails are those of a nearly normal
+        // distribution.
         let uniform = |k: usize| {
             ((k as u32).wrapping_mul(2_654_435_761) >> 8) as f64 / f64::from(1 << 24) - 0.5
         };

@@ -39,7 +39,7 @@ impl<T: Real> Player<T> {
         self.memory.at_rest(&self.prepared)
     }
 
-    /// Length of a run of so many samples at this period, see [`span`].
+    /// Length of a run of `samples` samples at the bench's period, see [`span`].
     pub(super) fn span(&self, samples: usize) -> usize {
         span(samples, self.period_s)
     }

@@ -282,16 +282,18 @@ impl Positive {
         [low, high]
     }
 
-    /// A bound of the limit superior, given an interval that holds both limits.
+    /// Upper bound of the limit superior of y, given an interval that contains its limit inferior
+    /// and its limit superior.
     fn above(&self, target: f64, [low, high]: [f64; 2]) -> f64 {
         let [open, closed] = self.looks;
         let mixed = usize::from(self.mixes);
         // With a closed valve, y_{n+1} is at most the larger of y_n and `closing`.
         let closing = (self.off.constant + self.off.older() * high) / (1.0 - self.off.newest());
-        // The open valve may close and stays open: the prediction with the closed valve is at most the target.
+        // If the open valve may close but stays open, the prediction with the closed valve is at most the
+        // target.
         let stays = newest_at(&self.off, &self.off, closed, target, low);
-        // The valve opens: the prediction with the open valve is below the target. The first sample of this prediction
-        // may still have the closed valve.
+        // If the valve opens, the prediction with the open valve is below the target. The first sample of this
+        // prediction may still have the closed valve.
         let first = if self.mixes { &self.off } else { &self.on };
         let opens = newest_at(first, &self.on, open, target, low);
         let [shortest, _] = self.hold;
@@ -403,7 +405,7 @@ mod tests {
             min_off_s: off,
             ..TrackRequest::holding(target)
         };
-        // No corrections, because the bound assumes an exact prediction.
+        // The law has no corrections, because the bound assumes an exact prediction.
         Track {
             integral_rate: 0.0,
             bias_rate: 0.0,
@@ -448,8 +450,8 @@ mod tests {
                 [0.040, 0.005],
             ] {
                 let law = law(&model, target, hold);
-                // At a target of 0.25, an opening of 40 ms from the level without blowing overshoots the target: the
-                // valve stays closed.
+                // At a target of 0.25, an opening of 40 ms from the level without blowing overshoots the target, so
+                // the valve stays closed.
                 let Certificate::Bound(bound) = certificate(&model, &law) else {
                     none += 1;
                     continue;
@@ -462,7 +464,8 @@ mod tests {
                     assert!(target - low <= bound.below + digits, "{place}: {low}");
                     assert!(high - target <= bound.above + digits, "{place}: {high}");
                     let share = (high - low) / (bound.below + bound.above);
-                    // With hold times of one sample the worst cases of the bound do not follow one another.
+                    // With hold times of one sample the worst cases of the bound cannot occur one after the
+                    // other, so the bound is less tight.
                     let least = if hold[0] > 0.001 { 0.4 } else { 0.15 };
                     assert!(share > least, "{place}: {share}");
                 }
@@ -472,7 +475,7 @@ mod tests {
         assert!(none <= 2, "{none} of 16 without a bound");
     }
 
-    /// The bound holds on the model only: without corrections a flow with other levels leaves it.
+    /// The bound holds only for the model. Without corrections, a flow with other levels leaves it.
     #[test]
     fn another_flow_is_outside_the_certificate() {
         let model = model();

@@ -2,8 +2,8 @@
 //!
 //! A beam search over blocks of samples. A partial command is ranked by its better completion: the valve
 //! open, or closed, to the end of the horizon, as soon as its hold time allows. The rank is therefore the
-//! value of a complete command, with everything still in the delay counted, and the best completion met is
-//! the answer. If the beam never dropped a command, the answer is exact.
+//! value of a complete command, including the part that is still in the delay. The best completion found
+//! is the answer. If the beam never dropped a command, the answer is exact.
 
 use super::bench::Player;
 use super::rules::RULES;
@@ -123,7 +123,8 @@ impl HorizonSearch<'_> {
                 });
                 grown.collect::<Vec<_>>()
             };
-            // Kept in beam order, so that the result does not depend on the threads.
+            // The beam is kept in its order, so that the result does not depend on the number of
+            // threads.
             let grown = parallel::each(&beam, grow).into_iter().flatten();
             let finite = |node: &Node| node.promise.is_finite();
             let mut grown: Vec<Node> = grown.filter(finite).collect();
@@ -198,7 +199,7 @@ pub(super) fn cycle(command: &[bool], shortest: usize) -> Option<(usize, f64)> {
             let differ = late.iter().zip(early).filter(|(a, b)| a != b).count();
             (period, differ as f64 / period as f64)
         })
-        // Of equally good periods the shortest.
+        // Of equally good periods the shortest is used.
         .min_by(|a, b| a.1.total_cmp(&b.1))
 }
 
@@ -251,7 +252,7 @@ mod tests {
         };
         for (hold, price) in [(30, 0.3), (60, 0.1), (90, 0.5)] {
             let search = search(&bench, hold, price, horizon);
-            // From an attached flow with the valve just opened.
+            // The plan starts from an attached flow with the valve just opened.
             let mut start = FlowState::at_rest(&bench);
             start.play(&bench, true, 900, 0.0);
             start.play(&bench, false, 300, 0.0);

@@ -3,7 +3,7 @@
 //! The plant is the model with delays, gain and time constants multiplied by factors. Rays start at the model
 //! in the planes of two logarithmic factors; bisection finds the point on each ray where attachment is lost
 //! in one of several seeded runs, or the rms error exceeds twice that on the model. This is a sampled region
-//! without a certificate: it says nothing between rays, or about other model errors.
+//! without a certificate: it gives no statement between the rays or about other model errors.
 
 use super::bench::Player;
 use super::noise::Noisy;
@@ -69,7 +69,7 @@ fn mistaken(model: &Model, delay: f64, gain: f64) -> Model {
 struct Slowed<F> {
     flow: F,
     times: f64,
-    /// Pending time of the flow, samples.
+    /// Time by which the flow must still be advanced, in its own samples.
     due: f64,
     reading: Option<f64>,
 }
@@ -108,7 +108,7 @@ pub fn margin(model: &Model, law: &Track, noise: f64, seed: u64, planes: bool) -
         most: RULES.margin_rms * rms,
         ..search
     };
-    // Along the axes, downwards and upwards.
+    // The first six rays go along the axes, downwards and upwards.
     let axes: Vec<End> = parallel::each(0..6, |way| {
         let mut direction = [0.0; 3];
         direction[way / 2] = if way % 2 == 0 { -1.0 } else { 1.0 };

@@ -111,7 +111,8 @@ pub struct Weighed {
 /// The best pulses.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct BestPulses {
-    /// Mean friction of the pulses, the lowest with a period 2 % off, y.
+    /// Mean friction of the pulses, y: the lowest of the means with the period itself and with
+    /// periods 2 % shorter and longer.
     pub mean: f64,
     /// Share of time with the valve open.
     pub duty: f64,
@@ -226,7 +227,7 @@ pub fn maximise(model: &Model, request: &MaximiseRequest) -> Result<Optimum, Des
     candidates.push(search.judge(&steady));
     let best_first = |list: &mut Vec<JudgedTrain>| order::descending(list, |one| one.value);
     best_first(&mut candidates);
-    // The best few are refined; they are rarely neighbours.
+    // The best distinct trains are refined.
     let starts: Vec<JudgedTrain> = distinct(&candidates, RULES.refined);
     let mut refined = parallel::each(starts, |start| {
         search.refine(start, request.pulses.clamp(1, 4))
@@ -478,7 +479,7 @@ impl TrainSearch {
                     });
                 }
             }
-            // A longer period at the same duty.
+            // Tries a longer or shorter period at the same duty.
             add(&|t| {
                 t.period = shifted(t.period, up)?;
                 t.pulses[0].1 = shifted(t.pulses[0].1, up)?;
@@ -495,7 +496,7 @@ impl TrainSearch {
         if *train != Train::steady() {
             let off = train.period.div_ceil(RULES.detuned);
             for period in [train.period - off, train.period + off] {
-                // Same duty, as for a slower or faster flow.
+                // The duty stays the same, as if the flow were slower or faster.
                 let stretched = train.stretched(period);
                 let near = self.long_run(&stretched);
                 detuned = detuned.min(near.as_ref().map_or(f64::NEG_INFINITY, |n| n.0.mean));
@@ -602,7 +603,8 @@ mod tests {
         let (pulses, steady) = (weighed.pulses.unwrap(), weighed.steady_value.unwrap());
         assert_eq!(weighed.value, pulses.value.max(steady));
         assert!((pulses.value - (pulses.mean - 0.4 * pulses.duty)).abs() < 1e-9);
-        // Pulses are the optimum exactly if the price of air is above the one from which they are better.
+        // Pulses are the optimum exactly if the price of air is above the lowest price at which they are
+        // better.
         let pays_from = weighed.pulses_pay_from.unwrap();
         assert_eq!(pulses.value > steady, 0.4 > pays_from, "{weighed:?}");
         assert!(optimum.mean_detuned > 0.95 * optimum.mean, "{optimum:?}");

@@ -3,8 +3,8 @@
 //! Each is the model with one change as large as the records allow and everything else refitted: delay, gain
 //! and time constants at the ends of their 95 % intervals; each effect of the catalogue at the largest size
 //! not excluded; delay laws that fit equally well; and for each effect of the model the other members of its
-//! equivalence set. In addition: effects at the size that a diagnosis detects with 80 % power. Where that is
-//! more than the records allow, these only warn.
+//! equivalence set. In addition: effects at the size that a diagnosis detects with 80 % power. If that size
+//! is larger than the records allow, the trial only gives a warning.
 
 use super::bench::Player;
 use super::record_judge::{RecordJudge, Refitted};
@@ -44,8 +44,8 @@ impl PossibleFlow {
     }
 }
 
-/// The plants that the records of `prepared` do not exclude beside `model`; none if the records contain no
-/// information about it.
+/// The plants, other than `model`, that the records of `prepared` do not exclude. None if the records
+/// contain no information about `model`.
 ///
 /// # Errors
 /// A missing channel, or a model whose free run diverges.
@@ -185,7 +185,7 @@ fn intervals(judge: &RecordJudge) -> Vec<PossibleFlow> {
             continue;
         }
         for side in [-1.0, 1.0] {
-            // Shortened below 1.96 standard errors if the linear approximation fails.
+            // The step is shortened below 1.96 standard errors if the linear approximation fails.
             let ends = (0..RULES.interval_steps).map(|step| 0.8_f64.powf(f64::from(step)));
             let flow = ends.into_iter().find_map(|share| {
                 let mut moved = values.clone();
@@ -341,7 +341,7 @@ fn largest_size(
     let at = |size: f64, start: &Option<Model>| {
         let parameters = between(spec, mild, worst, size);
         let fresh = with_effect(judge, spec, &parameters);
-        // Starts from the refit at a smaller size.
+        // The refit starts from the refit at a smaller size.
         let model = match start {
             Some(model) => Model {
                 effects: fresh.effects,

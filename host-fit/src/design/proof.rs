@@ -2,7 +2,7 @@
 //! stress.
 //!
 //! A law that loses attachment on the model or on a possible plant is rejected. Stress tests are reported and
-//! never reject a law: a plant of nearest physics with every effect of the catalogue at its worst, and
+//! never reject a law: the nearest physical plant with every effect of the catalogue at its worst, and
 //! conditions beyond the design.
 
 use super::bench::Player;
@@ -37,7 +37,8 @@ pub enum CaseGroup {
 }
 
 impl CaseGroup {
-    /// Whether losing attachment in this group rejects the law; otherwise it only warns.
+    /// Whether a loss of attachment in this group rejects the law; otherwise it only gives a
+    /// warning.
     #[must_use]
     pub fn decides(self) -> bool {
         matches!(self, Self::Model | Self::Possible)
@@ -73,8 +74,8 @@ pub struct Case {
     /// Lowest mean of the friction over 250 samples (250 ms at 1 kHz).
     #[serde(rename = "lowest_mean")]
     pub lowest: f64,
-    /// Whether the flow stays attached where steady blowing keeps it so: the lowest mean exceeds half of the
-    /// target or of the level under steady blowing.
+    /// Whether the flow stays attached if steady blowing keeps it attached: the lowest mean exceeds half of
+    /// the target or of the level under steady blowing.
     pub kept: bool,
 }
 
@@ -143,7 +144,7 @@ impl Proof {
     }
 }
 
-/// The plants of the trials beside the model.
+/// The plants of the trials, in addition to the model.
 #[derive(Clone, Copy, Debug)]
 pub struct Trials<'a, F> {
     /// Flows that are consistent with the records.

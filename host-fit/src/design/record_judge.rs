@@ -324,7 +324,7 @@ mod tests {
             let large = of_size(10.0 * PICKUP);
             assert!(large < RULES.not_excluded, "{seed}: {large}");
         }
-        // At a rate of 2.5 %, 5 or more of 40 have a probability of 1 in 300.
+        // At a rate of 2.5 %, the probability of 5 or more of 40 is 1 in 300.
         assert!(excluded < 5, "{excluded} of {seeds}");
     }
 }

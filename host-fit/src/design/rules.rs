@@ -32,7 +32,7 @@ rules! {
     /// Standard deviation of the model error assumed in the observer. Smaller: the estimate follows the
     /// model; larger: it follows the noise.
     model_error: f64 = 0.005, "share of the reachable interval", "tuned on plants other than those of docs/law.md";
-    /// Sensor noise averaged over 64 samples, if the rig's was not measured.
+    /// Sensor noise averaged over 64 samples, if the noise of the rig was not measured.
     usual_slow_noise: f64 = 0.025, "y", "a hot film: white noise of 0.03 y, and coloured noise of 0.035 y with a correlation time of 20 ms";
     /// Largest observer correction per sample.
     observer_most: f64 = 0.1, "share of the residual", "judgement";
@@ -58,7 +58,7 @@ rules! {
     anticipations: [f64; 6] = [0.85, 0.7, 0.55, 0.4, 0.2, 0.0], "of half a shortest time", "a grid; with the \
          shortest time m, a flow with the time constant τ crosses the centre of its swing after τ·ln(2/(1 + \
          e^(−m/τ)))";
-    /// The rms error must fall by this share.
+    /// A smaller anticipation is preferred if it lowers the rms error by at least this share.
     anticipated: f64 = 0.005, "share of the rms error", "judgement";
     /// Switches that the budget can accumulate. With fewer than those of two pulses, a valve that was open for a
     /// long time would have to stay closed until the budget recovers.
@@ -91,7 +91,8 @@ rules! {
 
     /// A plant is possible unless the one-sided p-value of the records is below this.
     not_excluded: f64 = 0.025, "p-value", "convention: the ends of intervals of 95 %";
-    /// Steps, each by a fifth, in which the end of an interval is searched inwards from 1.96 standard errors.
+    /// Number of steps in which the end of an interval is searched inwards from 1.96 standard errors; each
+    /// step shortens the interval by a fifth.
     interval_steps: u32 = 20, "", "judgement: the last step is at 1/70 of 1.96 standard errors";
     /// Gauss–Newton steps of the refit for a possible plant.
     refitting_steps: usize = 5, "", "judgement";
@@ -131,7 +132,7 @@ rules! {
     train_from: usize = 3000, "samples", "judgement";
     /// Least scored length in the first comparison.
     train_judged: usize = 5000, "samples", "judgement";
-    /// Start of the scored part of a long run, which lasts as long again.
+    /// Start of the scored part of a long run. The scored part is as long as the part before it.
     long_from: usize = 20_000, "samples", "20 s to 40 s at 1 kHz";
     /// End of a long run, at which the motion must be unchanged.
     long_until: usize = 240_000, "samples", "four minutes at 1 kHz";
@@ -164,6 +165,6 @@ rules! {
     /// Replanning instants per horizon of a receding-horizon law, because the end of a plan ignores what
     /// follows.
     plans: u32 = 3, "plans", "judgement";
-    /// Length of the receding-horizon run that shows its limit cycle.
+    /// Length of the run with receding horizon, long enough to show its limit cycle.
     receding: usize = 8000, "samples", "judgement";
 }

@@ -90,7 +90,7 @@ pub fn time_constants(model: &Model, low: f64, high: f64) -> [f64; 2] {
             };
             if let (Some(arrived), true) = (arrived, there) {
                 let samples = k + 1 - arrived;
-                // Settle before the next edge.
+                // The model settles before the next edge.
                 for _ in 0..most {
                     bench.step(&mut state, on);
                 }

@@ -325,8 +325,8 @@ fn settled(rate: f64, ripple: f64, density: f64, period_s: f64) -> f64 {
 /// `law` limited to `rate` switches per sample, for a flow that needs `duty`.
 ///
 /// The switching budget fixes the time between two openings, whatever duty the flow needs. The hold time of
-/// the shorter part is slightly less than its duration, so that the law knows its ripple and the budget
-/// remains the limit.
+/// the shorter part is slightly less than its duration, so that the law knows its ripple, but the budget
+/// limits the switching rate.
 fn paced(law: &Track, rate: f64, duty: f64) -> Track {
     let cycle = 2.0 / rate;
     let duty = duty.clamp(0.02, 0.98);
@@ -517,8 +517,8 @@ pub(super) mod tests {
         assert_eq!(design.law.switches, Some([50, 10]));
     }
 
-    /// A flow that settles within the shortest times, held at half of steady blowing: no square wave with these times
-    /// has less ripple than the one of equal parts, which swings between e^{−m/τ} times and once its upper end.
+    /// A flow that settles within the shortest times, held at half of steady blowing: the square wave with equal on
+    /// and off times has the least ripple. It swings between its upper end and e^{−m/τ} times that value.
     #[test]
     fn the_ripple_is_least_for_times_longer_than_the_flow_takes() {
         let (tau, shortest) = (20.0_f64, 40.0);
@@ -539,7 +539,8 @@ pub(super) mod tests {
         let design = track(&model, &request).unwrap();
         let figures = on_model(&Player::of(&model), design.law.tracking());
         let decay = (-shortest / tau).exp();
-        // Mean square of (1 − high·e^{−t/τ}) − 1/2 over a part, high = 1/(1 + decay).
+        // Mean square of (1 − high·e^{−t/τ}) − 1/2 over one part of the cycle, with high = 1/(1 +
+        // decay).
         let high = 1.0 / (1.0 + decay);
         let mean_square = 0.25 - high * tau / shortest * (1.0 - decay)
             + high.powi(2) * tau / (2.0 * shortest) * (1.0 - decay.powi(2));

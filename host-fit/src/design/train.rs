@@ -32,7 +32,7 @@ impl Train {
         (0..self.period.max(1)).map(|at| train.is_on(at)).collect()
     }
 
-    /// The train with its periods multiplied: slower or faster.
+    /// The train with another period (samples) at the same duty.
     pub(super) fn stretched(&self, period: u32) -> Self {
         let scale =
             |x: u32| (f64::from(x) * f64::from(period) / f64::from(self.period)).round() as u32;

@@ -25,8 +25,8 @@ pub struct Certificate {
     pub alpha: f64,
     /// Names of the records from which the certificate was computed.
     pub records: Vec<String>,
-    /// Of the variance that the best model without the effect leaves unexplained: the share that the model with the
-    /// effect explains. At most 1; negative if the model with the effect leaves more variance unexplained. Models that
+    /// Share that the model with the effect explains of the variance that the best model without it leaves
+    /// unexplained. At most 1; negative if the model with the effect leaves more variance unexplained. Models that
     /// imitate the effect with more parameters and less evidence do not count.
     #[serde(skip)]
     pub share: f64,
@@ -39,7 +39,7 @@ impl Certificate {
         self.log_e >= -self.alpha.ln()
     }
 
-    /// The p-value that the e-value bounds: by Markov's inequality at most its inverse.
+    /// Upper bound of the p-value: the inverse of the e-value (Markov's inequality).
     #[must_use]
     pub(super) fn p_value(&self) -> f64 {
         p_of(self.log_e)
@@ -60,7 +60,7 @@ pub struct Parsimony {
     pub effects: Vec<String>,
     /// ln of the evidence of the final model minus that of the given model, nats.
     pub nats: f64,
-    /// Number of coefficients and parameters that the final model has fewer than the given one.
+    /// By how many coefficients and parameters the final model is smaller than the given one.
     pub terms_fewer: usize,
 }
 
@@ -113,7 +113,8 @@ impl Session<'_> {
         self.certificate(subject, own, &nulls, found)
     }
 
-    /// Whether the given model imitates the effects of `model`: it has none of them, more parameters and less evidence.
+    /// Whether the given model imitates the effects of `model`: it has none of these effects, but more parameters, and
+    /// less evidence.
     pub(super) fn given_imitates(&self, model: &Hypothesis) -> bool {
         let names = model.terms.iter().filter_map(Term::effect);
         let names: Vec<&str> = names.map(|effect| effect.name).collect();
@@ -180,9 +181,10 @@ impl Session<'_> {
         })
     }
 
-    /// The certificate of each effect of `subject`: the largest evidence of the models with the effect over the largest of
-    /// the models that contain neither the effect nor another member of its equivalence set. Such a model may have more
-    /// evidence than `subject` because of its other terms; the effect is therefore also added to it.
+    /// The certificate of each effect of `subject`: the largest evidence of the models with the effect, divided by the
+    /// largest evidence of the models that contain neither the effect nor another member of its equivalence set. A
+    /// model without the effect may have more evidence than `subject` because of its other terms; the effect is
+    /// therefore also added to such models.
     pub(super) fn certificates(
         &self,
         subject: &Hypothesis,
@@ -231,7 +233,7 @@ impl Session<'_> {
         let own = self.evidence_of(model);
         let certificates = effects.into_iter().filter_map(|(term, places)| {
             let name = term.effect()?.name;
-            // Without the evidence of a null model nothing is certified.
+            // If the evidence of a null model is unknown, nothing is certified.
             let evident = |at: &usize| Some((*at, nulls[*at]?));
             let own_nulls: Option<Vec<(usize, Null)>> = places.iter().map(evident).collect();
             let own_nulls = own_nulls?;

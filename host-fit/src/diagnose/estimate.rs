@@ -75,9 +75,10 @@ pub(crate) fn estimates_among(
     .collect()
 }
 
-/// Whether these intervals identify an effect: that of its amplitude excludes 0, that of a parameter below another
-/// excludes the other's value, and that of at least one positive parameter is narrower than a factor. Two parameters may
-/// be correlated, for example those of King's law; then only a combination of them is identifiable.
+/// Whether these intervals identify an effect. The interval of the amplitude must exclude 0. The interval of a
+/// parameter that must be below another parameter must exclude the value of that parameter. The interval of at least
+/// one positive parameter must be narrower than a factor. Two parameters may be correlated, for example those of King's
+/// law; then only a combination of them is identifiable.
 pub(super) fn is_identified(estimates: &BTreeMap<String, ParameterEstimate>, spec: &Spec) -> bool {
     let amplitude = spec.amplitude.filter(|amplitude| amplitude.linear);
     let amplitude = amplitude.and_then(|amplitude| estimates.get(amplitude.parameter));
@@ -158,7 +159,8 @@ mod tests {
         assert!(!known(0.5));
     }
 
-    /// Ratio and offset of King's law are correlated: one of them is enough.
+    /// The ratio and the offset of King's law are correlated, therefore it is enough if one of them
+    /// is known.
     #[test]
     fn one_known_parameter_of_two_identifies_an_effect() {
         let known = |ratio: f64, offset: f64| {

@@ -187,8 +187,8 @@ pub struct Diagnosis {
     pub noise_source: NoiseSource,
     /// The noise level on the validation samples, y rms: measured or estimated.
     pub noise_estimate: f64,
-    /// Relative scatter of a record's level between repeats, if `y_sd` shows one. Errors along it are not
-    /// counted as model error.
+    /// Relative scatter of a record's level between repeats, if `y_sd` shows one. Errors in proportion to
+    /// y, which this scatter causes, are not counted as model error.
     pub level_scatter: Option<f64>,
     /// The final model's error on records that played no part in the choice of the structure. None if there
     /// are too few records to set some aside.

@@ -59,7 +59,7 @@ rules! {
     follows_a_channel: f64 = 0.25, "share of the model error above the noise", "judgement: smallest share of a surrogate";
     /// A lag shorter than this belongs to the model order and is not reported as a memory.
     shortest_memory: usize = SHORTEST_MEMORY, "samples", "judgement: the time scale of a fast flow at 1 kHz";
-    /// If the net rate is below this share of the dominant pole's, it is a difference of lags that cancel; the pole
-    /// is used instead.
+    /// A net rate below this share of the rate of the dominant pole is only a difference of lags that cancel. The
+    /// rate of the pole is then used.
     cancelled: f64 = 0.01, "share of the rate", "judgement";
 }

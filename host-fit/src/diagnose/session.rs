@@ -194,7 +194,8 @@ impl Session<'_> {
             .collect();
         let mut ranking = self.ranked(&context, &others, &found);
         for entry in &mut ranking {
-            // The ranking shows the parameters of the final model, and only equivalences that hold for that model.
+            // The ranking shows the parameters of the final model, and of the equivalences only those that hold
+            // for that model.
             if let Some(own) = parameters.get(&entry.effect) {
                 entry.parameters.clone_from(own);
                 let set = sets.iter().find(|set| set.effect.name == entry.effect);

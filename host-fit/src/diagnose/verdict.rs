@@ -164,7 +164,7 @@ impl Session<'_> {
         let (kept, lags) = lesser.terms.into_iter().partition(is_effect);
         let mut from = Hypothesis::new(lesser.judged);
         from.terms = lags;
-        // Lags with many more parameters than the effect are no simpler explanation.
+        // Lags with many more parameters than the effect are not a simpler explanation.
         let bases = Search {
             effects: false,
             most_parameters: from.cost() + best.terms[index].cost() + TERMS.head_start,

@@ -211,7 +211,8 @@ impl Coordinate {
         let rises = format!("u > {on:?} && was_on < 0.5");
         let falls = format!("u <= {on:?} && was_on > 0.5");
         let long_ago = LONG_AGO_S * time;
-        // Must be updated last, so that the other states use its value of the previous sample.
+        // This state must be updated last, so that the other states use its value of the previous
+        // sample.
         let was_on = || State {
             name: "was_on",
             start: 0.0,

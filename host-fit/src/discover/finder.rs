@@ -48,7 +48,8 @@ impl Finder<'_> {
             looked_at += curves.len();
             let most = if index == 0 {
                 smallest = self.smallest(&curves);
-                // A first-order prediction underestimates the gain: half of the required gain suffices for a refit.
+                // A first-order prediction underestimates the gain, so a candidate with half of the required gain
+                // is refitted.
                 let wanted = (1.0 - RULES.promised * RULES.worthwhile) * base.judged.rmse();
                 let left = |curve: &Screened| (1.0 - curve.held_out).max(0.0).sqrt();
                 curves.retain(|curve| left(curve) * beside.judged.rmse() < wanted);

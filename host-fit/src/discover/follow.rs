@@ -76,7 +76,8 @@ impl Finder<'_> {
         for candidate in self.leading(&mut all) {
             let with = self.search.run(candidate.with, None).best;
             let followed = Candidate::of(candidate.term, with);
-            // At the noise level no candidate can be better; equivalent alternatives are searched later.
+            // No candidate can be better than one at the noise level; equivalent alternatives are
+            // searched later.
             if self.at_the_floor(&followed) {
                 return vec![followed];
             }

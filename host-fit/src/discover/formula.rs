@@ -313,8 +313,8 @@ impl Form {
     }
 }
 
-/// The value at this fraction along sorted points; they follow the distribution of the coordinate, which may
-/// span decades.
+/// The value at the fraction `along` of the sorted points, interpolated between neighbours. The points
+/// follow the distribution of the coordinate, which may span decades.
 fn between(points: &[f64], along: f64) -> f64 {
     let index = along * (points.len() - 1) as f64;
     let before = (index as usize).min(points.len() - 2);

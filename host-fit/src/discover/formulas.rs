@@ -46,8 +46,8 @@ impl Finder<'_> {
     fn tell(&self, found: &mut Found, term: Term, judged: &Judged, current: &mut Hypothesis) {
         let excess = |held_out: &HeldOut| self.search.judge.excess(held_out);
         let without = excess(&found.without.held_out).max(f64::MIN_POSITIVE);
-        // Other terms may have been added since the curve was fitted: the loss by the formula is measured on
-        // the present model.
+        // Other terms may have been added since the curve was fitted. The loss caused by the formula is
+        // therefore measured on the present model.
         let lost = excess(&judged.held_out) - excess(&current.judged.held_out);
         found.formula_taken = found.taken - lost / without;
         found.term = term;

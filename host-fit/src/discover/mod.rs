@@ -193,8 +193,8 @@ pub fn discover(
             break;
         }
     }
-    // Compared on the base model that belongs to the first term, because the best base without it may imitate the
-    // term.
+    // The comparison is made on the base model that belongs to the first term, because the best base without the
+    // term may imitate it.
     let lacking = found.first().map_or(&base.judged, |found| &found.without);
     let trace = missing(lacking.rmse())
         .then(|| {

@@ -1,4 +1,4 @@
-//! Places of a term, and its entry into the model there.
+//! Places at which a term can act, and the quantity that it changes there.
 
 use crate::terms::Units;
 use model_core::effect::Unit;
@@ -31,7 +31,7 @@ impl Place {
     }
 }
 
-/// The entry of a term at its place; g is the term's value.
+/// The quantity that a term changes at its place; g is the value of the term.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Entry {
     /// The jet's strength, multiplied by 1 + g.
@@ -103,7 +103,8 @@ impl Entry {
         !matches!(self, Self::Level | Self::Reading)
     }
 
-    /// Weight of a sample for estimating g: a jet must be blowing, and a factor on y counts with y².
+    /// Weight of a sample for estimating g. A term of the jet shows only while a jet is blowing. A
+    /// term that multiplies y has the weight y².
     pub(super) fn shown_by(self, blowing: bool, y: f64) -> f64 {
         match self {
             Self::Jet => f64::from(u8::from(blowing)),

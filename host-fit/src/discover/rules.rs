@@ -49,9 +49,9 @@ rules! {
     worthwhile: f64 = 0.015, "share of the rms error", "as for effects of the catalogue";
     /// If the noise level is known, a term must explain this share of the unexplained variance.
     least_share: f64 = 0.25, "share of the model error above the noise", "as for the surrogates of `diagnose`; on a drifting rig a wrong delay term explained 19 %";
-    /// A base model below this factor is near the noise level. A term must then explain the share `most_of_it`. A
-    /// sensitivity, or a dependence on the time in the record, is then not reported, because record-to-record
-    /// scatter and drift look like them.
+    /// A base model with a validation error below this is near the noise level. A term must then explain the
+    /// share `most_of_it`. A sensitivity, or a dependence on the time in the record, is then not reported,
+    /// because record-to-record scatter and drift look like them.
     near_the_floor: f64 = 1.10, "times the noise level", "in nine families, base models of rigs without a missing term stay below this";
     /// Share of the unexplained variance that a term must explain near the noise level, and wherever the
     /// sensor has a record-to-record offset.

@@ -104,7 +104,8 @@ fn points(mut weighted: Vec<(f64, f64)>) -> Option<(Vec<f64>, usize)> {
             x.push(place);
         }
     }
-    // A rest that is constant throughout a record covers several quantiles; the values between them get points too.
+    // A rest that is constant throughout a record covers several quantiles. The values between such rests get
+    // points too.
     let from = |x: f64| weighted.partition_point(|(own, _)| *own <= x);
     let to = |x: f64| weighted.partition_point(|(own, _)| *own < x);
     let before = |index: usize| index.checked_sub(1).map_or(0.0, |last| up_to[last]);
@@ -133,7 +134,8 @@ fn points(mut weighted: Vec<(f64, f64)>) -> Option<(Vec<f64>, usize)> {
     Some((x, nearest))
 }
 
-/// Reduction of the model's own delay for a term, s: room for a delay that shrinks.
+/// Time by which the model's own delay is shortened for a term of the delay, s, so that the term
+/// can also shorten the delay.
 pub(super) fn room(entry: Entry, model: &Model) -> f64 {
     match entry {
         Entry::Delay => {

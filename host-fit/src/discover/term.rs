@@ -39,7 +39,8 @@ pub(super) struct Term {
     pub(super) fading: Option<[f64; 2]>,
     /// Above this level the command counts as on.
     pub(super) on: f64,
-    /// Reduction of the model's own delay, s: room for a delay that shrinks.
+    /// Time by which the model's own delay is shortened, s, so that the term can also shorten the
+    /// delay.
     pub(super) shift: f64,
     /// Inner unit of time, s.
     pub(super) time: f64,
@@ -400,7 +401,7 @@ mod tests {
         let other = free.with_values(&[0.2, 0.4, 0.35]);
         assert_eq!(other.coordinate, Coordinate::MemoryOfU(0.35));
         assert_eq!(other.values(), [0.2, 0.4, 0.35]);
-        // The search interval stays unchanged and is converted with its unit.
+        // The physical search interval stays the same; its numbers are converted with the unit.
         assert_eq!(other.fading, Some([0.1, 0.4]));
         let slow = Units {
             time: 10.0,
@@ -426,8 +427,8 @@ mod tests {
         assert_eq!(x[4..9], [4.0, 4.25, 4.5, 4.75, 5.0]);
         assert!((g[6] + 0.1).abs() < 1e-12);
         assert_eq!(*pinned, Some(4));
-        // In the next round, points collinear with their neighbours are removed, except the fixed one and the
-        // ends.
+        // In the next round, points collinear with their neighbours are removed, except the fixed point and
+        // the end points.
         let errors = [0.0; 11];
         let finest = finer.finer(&errors).expect("a curve");
         let Shape::Points { x, g, pinned } = &finest.shape else {

@@ -18,7 +18,7 @@ impl Openings {
         let mut u = Vec::with_capacity(samples);
         let mut level = 0.0;
         for dwell in &self.dwells {
-            // Rounded up, so that no level is shorter than the valve's limit.
+            // The length is rounded up, so that no level is shorter than the valve's limit.
             let length = (dwell / period - 1e-6).ceil().max(0.0) as usize;
             u.extend(std::iter::repeat_n(level, length.min(samples - u.len())));
             level = 1.0 - level;

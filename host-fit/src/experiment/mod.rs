@@ -216,7 +216,8 @@ impl Experiment {
         write_atomic(path, |file| {
             writeln!(file, "t,u")?;
             for (k, u) in self.u.iter().enumerate() {
-                // Multiples of the sample period, rounded to remove binary representation errors.
+                // Times are multiples of the sample period, rounded to remove binary representation
+                // errors.
                 let t = (k as f64 * self.sample_period_s * 1e9).round() / 1e9;
                 writeln!(file, "{t},{u}")?;
             }
@@ -262,7 +263,7 @@ mod tests {
             assert!(dwell >= if pair[0] == 1.0 { 50 } else { 30 }, "{dwell}");
             dwell = 1;
         }
-        // Better than the square wave of the paper.
+        // The proposed command is better than the square wave of the paper.
         let square: Vec<f64> = (0..6000).map(|k| f64::from(k % 250 < 125)).collect();
         let usual = separation(&models, &square) / 0.01;
         println!("{} (4 Hz 50 %: {usual:.0})", found.words());
@@ -287,7 +288,7 @@ mod tests {
             .expect("no noise")
             .experiment
             .separation_sigmas;
-        // Noise levels at which the separation is two and four standard deviations.
+        // At these noise levels the separation is two and four standard deviations.
         assert!(proposed(1e-6 * sigmas / 2.0).is_none());
         assert!(proposed(1e-6 * sigmas / 4.0).is_some());
     }

@@ -106,9 +106,10 @@ pub fn fit_with_effect(
         })
 }
 
-/// Whether a base model fitted without this effect is a bad starting point for the model with it. A sensor that shows
-/// only the size of the friction and a measured input change the gain, the delay and the time constant of the base; a
-/// pickup can pull the delay of the base to 0, where the two cannot be distinguished.
+/// Whether a base model fitted without this effect is a bad starting point for the model with it. Three kinds of
+/// effects are concerned. A sensor that shows only the size of the friction, and a measured input, change the gain,
+/// the delay and the time constant of the base. A pickup can pull the delay of the base to 0, where pickup and
+/// response are not distinguishable.
 #[must_use]
 pub fn needs_fresh_starts(base: &Model, spec: &Spec) -> bool {
     let dead_time = base.delay.present(0.0, base.sample_period_s);

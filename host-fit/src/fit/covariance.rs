@@ -4,9 +4,9 @@
 //! robust estimates are computed, and the larger counts for each coordinate. Sums of J·r over blocks much
 //! longer than the correlation time are uncorrelated; their outer products give the *sandwich* estimate
 //! (batch means), which misses disturbances longer than a block. The *jackknife* over records, to first
-//! order, includes these, because each record would give different parameters. With few records it is
-//! uncertain, which Student's t allows for (MacKinnon, Nielsen and Webb 2023, J. Econometrics 232:272, advise
-//! this for few clusters).
+//! order, includes such long disturbances, because each record would give different parameters. With few
+//! records the jackknife is uncertain; Student's t allows for this (MacKinnon, Nielsen and Webb 2023, J.
+//! Econometrics 232:272, advise this for few clusters).
 
 use super::levenberg::Part;
 use super::rules::RULES;
@@ -57,7 +57,7 @@ fn sandwich(parts: &[Part], batches: usize, inverse: &[f64], n: usize) -> Vec<f6
             count += 1;
         }
     }
-    // The gradient is 0 at a minimum: one degree of freedom less.
+    // The gradient is 0 at a minimum, which removes one degree of freedom.
     let count = f64::from(count);
     middle
         .iter_mut()
@@ -223,7 +223,8 @@ mod tests {
                 held[i] += usize::from(found[i].abs() <= 1.96 * covariance[3 * i].sqrt());
             }
         }
-        // Binomial(300, 0.95): 285 ± 3.8. Blocks count the levels as noise, which widens the interval of the wave.
+        // Of 300 intervals, 285 ± 3.8 are expected to contain the true value. Blocks count the levels as noise,
+        // which widens the interval of the wave.
         let [mean, wave] = held;
         assert!(
             (274..=296).contains(&mean) && wave >= 274,

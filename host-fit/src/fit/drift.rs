@@ -80,11 +80,11 @@ mod tests {
     fn an_integrator_drifts_and_a_damped_rig_does_not() {
         let y = vec![0.0; 2000];
         let records = [Record::new("a", Use::Identify, 0.001, y.clone(), y)];
-        // A double pole at 1, and one at 1 together with a fast one.
+        // The models have a double pole at 1, and a pole at 1 together with a fast one.
         for a in [[2.0, -1.0], [1.9, -0.9]] {
             assert!(restart_after(&model(a), &records).is_some(), "{a:?}");
         }
-        // Poles at 0.9, and a ringing pair of radius 0.96.
+        // The models have poles at 0.9, and a pair of oscillating poles of radius 0.96.
         for a in [[1.8, -0.81], [1.46, -0.93]] {
             assert_eq!(restart_after(&model(a), &records), None, "{a:?}");
         }

@@ -33,7 +33,8 @@ pub struct FitOptions {
     pub linear: bool,
     /// Whether the delay law is free.
     pub delay: bool,
-    /// Scatter of a record's level, if known: errors along y then have less weight.
+    /// Scatter of the level between records, if known. Errors in proportion to y then have less
+    /// weight.
     pub level_scatter: Option<LevelScatter>,
 }
 
@@ -295,7 +296,7 @@ fn derivatives(
     Some((simulated, columns))
 }
 
-/// [`derivatives`] along less than `N` slopes, in one run.
+/// [`derivatives`] along fewer than `N` slopes, in one run.
 fn derivatives_at_once<const N: usize>(
     model: &Model,
     values: &[f64],
@@ -340,7 +341,8 @@ impl LeastSquares for FreeRunProblem<'_> {
         let each = |record: usize| {
             let (measured, lead) = (self.measured[record], self.lead[record]);
             let (mut sum, mut product, mut square) = (0.0, 0.0, 0.0);
-            // The component of the error along y is known only at the end of the record.
+            // With level scatter the run cannot be stopped early, because the component of the
+            // error along y is known only at the end of the record.
             let enough = match self.level_scatter {
                 Some(_) => f64::MAX,
                 None => enough,

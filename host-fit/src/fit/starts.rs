@@ -53,7 +53,7 @@ impl Known {
             time: 1.0,
             y_per_sample: self.y_per_sample,
             sorted_y: &self.sorted_y,
-            // In the middle of a law's range.
+            // The delay is that in the middle of a law's range.
             delay: model.delay.present(0.5 * y, period),
             period,
             record,
@@ -79,7 +79,7 @@ pub(crate) fn starts(base: &Model, spec: &Spec, records: &[&Record]) -> Vec<Vec<
             .map(|value| StartValue::Number(*value).value(parameter, &facts))
             .collect()
     }));
-    // Reduced evenly, so that no parameter keeps only its first value.
+    // The list is reduced evenly, so that no parameter keeps only its first value.
     let stride = all.len().div_ceil(RULES.most_starts).max(1);
     all.into_iter().step_by(stride).collect()
 }

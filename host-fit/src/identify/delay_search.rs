@@ -36,7 +36,7 @@ pub(crate) fn search(
     let mut one_step = OneStep { regression };
     let kicks = match options.objective {
         Objective::OneStep => RULES.kicks * options.patience,
-        // Only a starting point is needed.
+        // The free-run search needs only a starting point from this stage.
         Objective::FreeRun => options.patience,
     };
     let mut steps: Vec<Box<dyn SearchStep<OneStep>>> = vec![
@@ -83,7 +83,7 @@ pub(crate) fn search(
         interrupt,
     );
     if free.best.is_none() {
-        // After an interrupt in the first stage its best point is the result.
+        // After an interrupt in the first stage, the best point of that stage is the result.
         free.best = report.best.map(|best| {
             let delays = free_run.regression.layout.delays(&best.point);
             let value = match free_run.epsilon(&delays, f64::INFINITY) {

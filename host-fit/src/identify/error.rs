@@ -176,7 +176,7 @@ pub(crate) fn check(records: &[&Record], structure: &Structure) -> Result<(), Id
     }
     let constant = |r: &&Record| r.u.iter().all(|u| Some(u) == r.u.first());
     let same = records.iter().all(|r| r.u.first() == records[0].u.first());
-    // With rest before the record, a command that is on from the start is a step.
+    // If the record is preceded by rest, a command that is on from the start is a step.
     let rises = structure.skipped() == 0
         && records
             .iter()

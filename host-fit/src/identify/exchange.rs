@@ -32,9 +32,9 @@ pub(crate) struct Slot {
 
 /// The gain of every lag of a list, given a set of regressors.
 struct Projected {
-    /// Per input of the block, per kept regressor: projections, one per lag.
+    /// For each input of the block and each kept regressor: the projections, one for each lag.
     rows: Vec<Vec<Vec<f64>>>,
-    /// Per input: product with the residual of the target, one per lag.
+    /// For each input: the products with the residual of the target, one for each lag.
     target: Vec<Vec<f64>>,
     /// Squared length after projection, one per lag, for blocks of one regressor.
     left: Vec<f64>,
@@ -172,7 +172,7 @@ impl<'a> Exchange<'a> {
             .collect()
     }
 
-    /// The lag that leaves the smallest residual in a slot, and that residual.
+    /// The lag of this slot with the smallest residual, and that residual.
     pub(crate) fn best_single(&mut self, delays: &Delays, slot: Slot) -> Option<(u16, f64)> {
         let kept = self.kept(delays, &[slot]);
         let (factor, w) = self.factorise(&kept);

@@ -26,8 +26,8 @@ impl FreeRun {
         {
             RunOutcome::Squared(sum) => Evaluation::Value(sum.sqrt()),
             RunOutcome::AtLeast(_) => Evaluation::AtLeast(give_up_at),
-            // The later a run diverges, the lower its value, down to half. A search can thus leave the unstable
-            // region.
+            // The later a run diverges, the lower its value, down to half of the largest. A search can thus
+            // leave the unstable region.
             RunOutcome::Diverged(done) => {
                 Evaluation::Value(self.runner.diverged * (1.0 - 0.5 * done))
             }

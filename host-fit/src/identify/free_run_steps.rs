@@ -13,7 +13,8 @@ use crate::search::{Around, Evaluator, Point, SearchStep, StopReason, Success};
 /// Steps tried around the best of the predicted lags.
 const AROUND: [i32; 6] = [-1, 1, -2, 2, -4, 4];
 
-/// Search step: exchanges lags where the linearised free run predicts the best.
+/// Search step: exchanges lags for those with the lowest error predicted by the linearised free
+/// run.
 pub(crate) fn exchange_predicted(
     evaluator: &mut Evaluator<'_, FreeRun>,
     around: &Around<'_>,
@@ -74,7 +75,7 @@ fn descend(
                 .map(|lag| with_lag(evaluator.problem(), &delays, slot, *lag))
                 .collect();
             let found = best_of(evaluator, &trials, &mut best)?;
-            // Continue from the best lag of the slot, whether new or not.
+            // The search continues from the best lag of the slot, whether it is new or not.
             let mut lag = match found {
                 Some(at) => minima[at],
                 None => lag_in(&delays, slot),
@@ -143,7 +144,8 @@ fn lag_in(delays: &Delays, slot: Slot) -> u16 {
     list.get(slot.index).copied().unwrap_or(1)
 }
 
-/// The deepest local minima over the lag of the predicted ε in a slot, below a threshold.
+/// The deepest local minima of the predicted ε over the lag of a slot, if they are below a
+/// threshold.
 fn predicted_minima(
     problem: &FreeRun,
     linearised: &mut Linearised,

@@ -258,7 +258,7 @@ struct BlockRun<'a> {
     keep: Option<&'a mut Trajectory>,
 }
 
-/// Terms of ỹ's sum, eq. (1).
+/// Number of terms in the sum of ỹ, eq. (1).
 const AVERAGED: usize = WINDOW as usize - 1;
 
 impl BlockRun<'_> {
@@ -273,7 +273,7 @@ impl BlockRun<'_> {
         follows.max(0.0)
     }
 
-    /// The delays of all inputs at that value.
+    /// The delays of all inputs at the averaged output `follows`, samples.
     #[inline(always)]
     fn delays(&self, follows: f64, delays: &mut [usize]) {
         for (delay, arrival) in delays.iter_mut().zip(self.arrivals) {
@@ -294,7 +294,7 @@ impl pulp::NullaryFnOnce for BlockRun<'_> {
             ..
         } = self.runner;
         let inputs = self.arrivals.len();
-        // Zeros before a record, for the longest lag and the average.
+        // Zeros precede a record, for the longest lag and the average.
         let padding = usize::from(structure.longest_lag).max(AVERAGED);
         let mut sum = 0.0;
         let mut done = 0;

@@ -107,10 +107,11 @@ impl LaggedOutputs {
     /// therefore differ only by the samples that enter and leave at the ends. Row 0 is summed directly; the changes
     /// are one matrix product with a row for each end.
     fn table_from_intervals(&self, intervals: &[Vec<(usize, usize)>]) -> Table {
-        // For the elements 1 + i: row i belongs to y_{k+1−i}.
+        // Row i belongs to y_{k+1−i}, the element with index 1 + i.
         let shifts = self.size - 1;
         let (mut first_row, mut first_sum) = (vec![0.0; shifts], 0.0);
-        // For each end: the outputs y_{n−i} from i = 0 on, newest last, and its sign.
+        // For each end of an interval: the outputs y_{n−i} from i = 0 on, newest last, and its
+        // sign.
         let mut ends: Vec<(&[f64], f64)> = Vec::new();
         for (padded, intervals) in self.padded.iter().zip(intervals) {
             for &(start, end) in intervals {

@@ -79,7 +79,8 @@ impl Filter<'_> {
         let mut at: Vec<f32> = vec![0.0; arrived.len()];
         for k in 0..samples {
             let (past, next) = self.outputs.split_at_mut((reach + k) * LANES);
-            // Lane 0 is the constant 1 if it starts the block, then lags ascend.
+            // Lane 0 is the constant 1 in a block that starts with it; the other lanes are lags in
+            // ascending order.
             if let Some((at, _)) = rows.next_if(|(_, row)| **row == k) {
                 let newest = past[past.len() - LANES..].iter();
                 for (i, value) in newest.enumerate().take(1 + self.lags - self.first) {
@@ -91,7 +92,7 @@ impl Filter<'_> {
             if gate == 0.0 {
                 drive.fill(0.0);
             } else {
-                // Position after the newest output that a lane reads.
+                // Position after the newest output that any lane reads.
                 let newest = LANES + reach + k + 4 - self.first - self.first_element;
                 let regressors = padded[newest - LANES..newest].iter().rev();
                 for (drive, y) in drive.iter_mut().zip(regressors) {

@@ -9,7 +9,8 @@ use crate::search::Settings;
 pub enum Objective {
     /// Norm of the one-step prediction errors.
     OneStep,
-    /// ε of the free run, eq. (9), with one-step least-squares coefficients: the paper's.
+    /// ε of the free run, eq. (9), with one-step least-squares coefficients. This is the objective
+    /// of the paper.
     #[default]
     FreeRun,
 }

@@ -27,7 +27,7 @@ fn tables_needed(inputs: usize) -> usize {
 /// Whether there is memory for the tables that candidates of `structure` need.
 ///
 /// # Errors
-/// [`TooMuch`] with what they take.
+/// [`TooMuch`] with the memory that they need.
 pub(crate) fn fits_in_memory(structure: &Structure) -> Result<(), TooMuch> {
     let tables = tables_needed(structure.inputs) as u64 + TABLES_BESIDE;
     let needed = tables * table_bytes(structure.longest_lag.into());
@@ -116,7 +116,7 @@ impl Regression {
         let layout = Layout::new(structure);
         let signals = FitSignals::new(records, structure);
         let longest = structure.convention.behind_newest(structure.longest_lag);
-        // At most half of the memory, but at least what one candidate needs.
+        // The tables may use half of the memory limit, or what one candidate needs if that is more.
         let fitting =
             usize::try_from(memory::limit() / 2 / table_bytes(longest)).unwrap_or(TABLES_KEPT);
         let most = fitting.clamp(
@@ -156,7 +156,7 @@ impl Regression {
         match (l, m) {
             (0, 0) => Which::Plain,
             (0, l) | (l, 0) => Which::Single(tick(l)),
-            // On or off: d² = d.
+            // For an on/off command d² = d.
             (l, m) if self.binary && tick(l) == tick(m) => Which::Single(tick(l)),
             (l, m) => Which::Product(tick(l).min(tick(m)), tick(l).max(tick(m))),
         }
@@ -313,7 +313,8 @@ impl Regression {
         }
     }
 
-    /// Adds the samples by which `to` differs from `from` (from nothing, if not given).
+    /// Adds the samples by which `to` differs from `from` (all samples of `to` if `from` is not
+    /// given).
     fn correct(
         &self,
         normal: &mut Normal,
@@ -383,7 +384,8 @@ impl Regression {
         let mut residuals = Vec::with_capacity(ticks.len());
         for &tick in ticks {
             let mut moved = delays.clone();
-            // Kept unsorted here: the columns of the inputs are in order of `delays`.
+            // The ticks are not sorted here, because the columns of the inputs are in the order of
+            // `delays`.
             moved.ticks[input] = tick;
             let columns = self.layout.columns(&moved);
             let weights: Vec<Weights> = (0..=moved.ticks.len())

@@ -440,7 +440,7 @@ mod tests {
             let grown = growth(&weights);
             assert!((grown - exact).abs() < 1e-4, "{own:?}: {grown} {exact}");
         }
-        // 65 535 lags: above the largest order that is solved by a companion matrix.
+        // 65 535 lags are more than the largest order that is solved by a companion matrix.
         let mut weights = vec![0.0; 65_535];
         (weights[0], weights[65_534]) = (0.96, 0.01);
         let pole = largest_pole(&weights).unwrap();
@@ -449,7 +449,7 @@ mod tests {
 
     #[test]
     fn eigenvalues_of_a_known_matrix() {
-        // Second differences: 2 − 2 cos(iπ/(n + 1)).
+        // The eigenvalues of second differences are 2 − 2 cos(iπ/(n + 1)).
         let n = 8;
         let mut a = vec![0.0; n * n];
         for i in 0..n {

@@ -146,7 +146,7 @@ impl Delay {
             (Self::Law(own), _) => {
                 let first = |factors: &[f64]| factors.first().copied().unwrap_or(1.0);
                 let (others, factor) = (other.factors(), first(&own.factors));
-                // If the first input has no delay, the others have the same delay as it.
+                // If the first input has no delay, all inputs get the same delay.
                 let ratio = |f: &f64| match first(&others) {
                     0.0 => 1.0,
                     first => f / first,
@@ -235,7 +235,7 @@ mod tests {
             delays: vec![49, 98],
         };
         assert_eq!(fixed.factors(), [1.0, 2.0]);
-        // A delay with the factors of another delay.
+        // The delay gets the factors of another delay.
         let own = constant.for_inputs_of(&fixed);
         assert_eq!(own.factors(), [1.0, 2.0]);
         let own = Delay::Fixed { delays: vec![9] }.for_inputs_of(&fixed);

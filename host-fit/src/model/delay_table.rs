@@ -101,7 +101,7 @@ impl DelayTable {
         Some(self.0.swap_remove(index).1)
     }
 
-    /// One value for each input; none without the key.
+    /// One value for each input. `None` if the table does not have the key.
     fn array<T>(
         &mut self,
         key: &str,

@@ -97,7 +97,7 @@ impl Model {
                 shortest = shortest.min(n as f64 * period);
                 longest = longest.max(n as f64 * period);
             }
-            // Half a sample of tolerance for rounded limits.
+            // The tolerance of half a sample is for rounded limits.
             if shortest < low - 0.5 * period {
                 said.push(format!(
                     "blowing for {shortest:.3} s, the shortest in the records is {low:.3} s"

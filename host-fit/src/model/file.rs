@@ -558,7 +558,7 @@ mod tests {
             model.add(spec, &values, None);
         }
         assert_eq!(model.effect_names(), order);
-        // In arbitrary order, as in a file edited by hand.
+        // The effects are in arbitrary order, as in a file edited by hand.
         model.effects.reverse();
         let read = Model::from_toml(&model.to_toml(), "m").expect("whole");
         assert_eq!(read.effect_names(), order);

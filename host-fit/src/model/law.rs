@@ -99,7 +99,7 @@ pub struct Maximise {
 }
 
 impl Track {
-    /// How far the law looks beyond an arrival, half samples.
+    /// Time for which the law predicts beyond an arrival, in units of half a sample.
     #[must_use]
     pub fn anticipation(&self) -> HoldTimes {
         match self.anticipation {

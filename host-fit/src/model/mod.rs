@@ -323,12 +323,12 @@ impl Model {
     #[must_use]
     pub fn longest_delay(&self) -> usize {
         let longest = self.delay.longest(self.sample_period_s);
-        // Longer ones in files are rejected; during a search they may exceed the limit.
+        // Longer delays in files are rejected, but during a search a delay may exceed the limit.
         longest.clamp(0.0, bounds::LONGEST.into()).round() as usize
     }
 
-    /// Makes delays unrounded, so that a fit can vary them: after an edge, y changes by several times the noise per
-    /// sample.
+    /// Makes delays unrounded, so that a fit can vary them. A delay that changes by a whole sample would change y
+    /// after an edge by several times the noise.
     pub(crate) fn delay_between_samples(&mut self) {
         match &mut self.delay {
             Delay::Law(law) => law.interpolated = true,

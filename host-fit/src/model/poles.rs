@@ -58,7 +58,7 @@ mod tests {
         };
         let first_order = flow(&[1], &[(-0.01_f64).exp()]).time_constant();
         assert!((first_order - 0.1).abs() < 1e-3, "{first_order}");
-        // Half of the relaxation acts 20 ms later: the time constant includes it.
+        // Half of the relaxation acts 20 ms later, and the time constant includes this delay.
         let lagged = flow(&[1, 21], &[0.988, 0.010]);
         let pole = lagged.largest_pole(false).expect("a pole");
         let slow = -0.001 / pole.ln();

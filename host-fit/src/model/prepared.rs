@@ -144,7 +144,8 @@ impl<T: Real> DelayLaw<T> for AnyDelay<T> {
 fn range<T: Real>(law: &AnyTransport<T>, factor: f64) -> Option<(usize, usize)> {
     let [shortest, longest] = law.bounds()?.map(|delay| factor * delay.value());
     let known = shortest >= 0.0 && longest.is_finite();
-    // One more sample on either side, because single precision may round across a whole one.
+    // One more sample is included on either side, because single precision may round to the next
+    // whole sample.
     known.then(|| ((shortest as usize).saturating_sub(1), longest as usize + 2))
 }
 
@@ -183,7 +184,8 @@ impl Model {
                         factors: factors.collect(),
                         rounded: !chosen.interpolated && rounding == Rounding::Samples,
                     },
-                    // Not reachable: `Delay::of` and files allow only laws of the catalogue.
+                    // This case cannot occur: `Delay::of` and files allow only laws of the
+                    // catalogue.
                     None => AnyDelay::Fixed(FixedDelay {
                         delays: vec![0; chosen.factors.len()],
                     }),

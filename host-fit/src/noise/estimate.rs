@@ -58,7 +58,7 @@ impl NoiseModel {
     pub fn of(errors: &[Series], measured: bool) -> Self {
         let samples: f64 = errors.iter().map(|e| e.residual.len() as f64).sum();
         let price = Price {
-            // Two more parameters must increase the log-likelihood by ln n.
+            // The two parameters of the colour must increase the log-likelihood by ln n.
             colour: samples.max(1.0).ln(),
             random_effect: 0.5 * (errors.len().max(1) as f64).ln().max(1.0),
         };
@@ -105,7 +105,7 @@ fn coloured(
     price: Price,
     near: Option<Colour>,
 ) -> (Colour, Best) {
-    // Equal steps in the logit of the share and in ln of the correlation time.
+    // The search steps are equal in the logit of the share and in ln of the correlation time.
     let logit = |share: f64| (share / (1.0 - share)).ln();
     let colour = |[share, memory]: [f64; 2]| Colour {
         share: 1.0 / (1.0 + (-share).exp()),
@@ -135,7 +135,8 @@ fn coloured(
         );
     };
     while step > FINEST {
-        // Share and correlation time are correlated along a ridge: diagonal neighbours are tried too.
+        // The likelihood has a ridge, because share and correlation time are correlated. Diagonal
+        // neighbours are therefore tried too.
         let around = (0..9).filter(|at| *at != 4);
         let next = around.map(|at| [f64::from(at / 3) - 1.0, f64::from(at % 3) - 1.0]);
         let next = next.map(|[s, m]| [best.0[0] + s * step, best.0[1] + m * step]);
@@ -180,7 +181,7 @@ fn maximised(summaries: &[Summary], kept: [bool; EFFECTS], least: f64) -> Best {
     let square: f64 = summaries.iter().map(|s| s.square).sum();
     let floor = |scale: f64| scale.max(least).max(f64::MIN_POSITIVE);
     let mut scale = floor(square / samples.max(1.0));
-    // Initial values: each random effect estimated separately.
+    // Initially, each random effect is estimated separately.
     let mut variances: [f64; EFFECTS] = std::array::from_fn(|i| {
         let each = summaries.iter().filter(|s| s.gram[i][i] > 0.0);
         let shown: f64 = each.map(|s| (s.products[i] / s.gram[i][i]).powi(2)).sum();

@@ -4,7 +4,7 @@
 //! Offset b, drift d and level a are Gaussian random effects per record, marginalised by Woodbury's identity of rank 3:
 //! errors along them are weighted by the record-to-record scatter, other errors in full. ε is white noise plus
 //! first-order coloured noise, proportional to the standard errors of the samples. A scalar Kalman filter whitens it;
-//! the filter is linear, so errors and derivatives are whitened alike.
+//! the filter is linear, so errors and derivatives are whitened in the same way.
 
 mod colour;
 mod estimate;

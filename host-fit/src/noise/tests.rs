@@ -89,7 +89,7 @@ fn whitened_errors_are_white_and_of_variance_one() {
             (variance - 1.0).abs() < 0.04,
             "{share}: {variance} {model:?}"
         );
-        // The largest of forty normal numbers.
+        // The limit allows for the largest of forty normal numbers.
         assert!(worst < 4.5, "{share}: {worst} {model:?}");
         assert!(
             (model.colour.share - share).abs() < 0.05,
@@ -121,7 +121,7 @@ fn offsets_drifts_and_levels_of_records_are_found_with_their_variance() {
         ..STILL
     };
     let model = NoiseModel::of(&records(&mut rng, 60, 2000, how), true);
-    // 60 draws estimate a standard deviation to 9 %.
+    // From 60 draws a standard deviation is estimated to 9 %.
     for (found, true_) in [
         (model.offset, how.offset),
         (model.drift, how.drift),

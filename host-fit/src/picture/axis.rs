@@ -121,7 +121,8 @@ impl Axis {
             .collect();
         let largest = values.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
         let exponent = step.log10().floor() as i32;
-        // Steps of 0.05 need two decimals, which is their exponent; nothing finer occurs.
+        // A step of 0.05 has the exponent −2 and needs two decimals. No step needs more decimals
+        // than its exponent says.
         let decimals = (-exponent).clamp(0, 12) as usize;
         let plain = largest < 1e6 && (exponent >= -4 || largest >= 0.1);
         values

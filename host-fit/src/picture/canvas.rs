@@ -4,8 +4,8 @@ use std::fmt::Write as _;
 
 use super::palette::{Colour, PAPER};
 
-/// Widths in which a picture is laid out, pixels: for half of a desk's screen, and for a phone's. Text has one size, so that it
-/// reads at both.
+/// Widths in which a picture is laid out, pixels: for half the screen of a desktop computer, and for a phone. The text
+/// has the same size in both, so that it can be read in both.
 const WIDTHS: [f64; 2] = [660.0, 420.0];
 /// Free border around a picture, pixels.
 pub(super) const MARGIN: f64 = 14.0;
@@ -261,7 +261,7 @@ impl Canvas {
         ));
     }
 
-    /// A disc, or a ring on the paper's colour.
+    /// A disc, or a ring that is filled with the colour of the background.
     pub(super) fn dot(&mut self, (x, y): (f64, f64), radius: f64, ink: Ink, filled: bool) {
         let style = if filled {
             ink.fill()
@@ -330,7 +330,7 @@ fn distance(pair: &[(f64, f64)]) -> f64 {
     }
 }
 
-/// A coordinate in tenths of a pixel; invalid numbers go to the edge of a large sheet.
+/// A coordinate, rounded to a tenth of a pixel and limited to ± 100 000 pixels; 0 for NaN.
 fn pixel(v: f64) -> f64 {
     let v = if v.is_nan() { 0.0 } else { v };
     (v.clamp(-1e5, 1e5) * 10.0).round() / 10.0
@@ -362,7 +362,8 @@ pub(super) fn text_width(text: &str, size: f64) -> f64 {
 
 /// `text`, shortened with an ellipsis if it is wider than `width` pixels.
 pub(super) fn fit(text: &str, size: f64, width: f64) -> String {
-    // Half a pixel of tolerance: callers compute `width` from the same text and round it.
+    // Half a pixel of tolerance is needed, because callers compute `width` from the same text and
+    // round it.
     if text_width(text, size) <= width + 0.5 {
         return text.to_owned();
     }

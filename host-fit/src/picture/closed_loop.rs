@@ -106,7 +106,7 @@ pub fn closed_loop(plot: &ClosedLoop<'_>) -> Picture {
         {
             let ink = Ink::new(series(index), 1.0).faint(0.85);
             let command = (clock, run.u, range.clone());
-            // Strips of several runs share the picture's size.
+            // The strips of several runs share the limit of the picture's size.
             let columns = columns / plot.runs.len().clamp(1, 4);
             strip(canvas, &main, bottom, command, columns, ("u", ink));
             bottom += STRIP + 5.0;

@@ -40,10 +40,10 @@ pub(super) fn min_max(values: &[f64], range: Range<usize>, columns: usize) -> Ve
     pieces
 }
 
-/// `range` cut into `columns` parts of equal length, to one sample.
+/// `range`, divided into `columns` parts whose lengths differ by at most one sample.
 pub(super) fn split(range: Range<usize>, columns: usize) -> impl Iterator<Item = Range<usize>> {
     let (start, length) = (range.start, range.len());
-    // Wide arithmetic, because length × column may overflow.
+    // The arithmetic is 128 bits wide, because length × column may overflow.
     let edge =
         move |column: usize| start + (length as u128 * column as u128 / columns as u128) as usize;
     (0..columns).map(move |column| edge(column)..edge(column + 1))

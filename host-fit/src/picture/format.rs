@@ -40,8 +40,8 @@ pub fn significant(value: f64, digits: usize) -> String {
         return "–".to_owned();
     }
     let digits = digits.clamp(1, 17);
-    // Rounded first: 0.99996 to three digits is 1, in the next decade. Rounding the largest numbers would give
-    // infinity.
+    // The number is rounded first: 0.99996 to three digits is 1, in the next decade. Rounding the largest
+    // numbers would give infinity.
     let rounded: f64 = format!("{value:.*e}", digits - 1).parse().unwrap_or(value);
     let rounded = if rounded.is_finite() { rounded } else { value };
     if rounded == 0.0 {

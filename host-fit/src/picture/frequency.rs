@@ -54,8 +54,9 @@ const BETWEEN: f64 = 20.0;
 /// A point of one panel with its limits: logarithm of the frequency, value, lower and upper limit.
 type Measured = (f64, f64, [f64; 2]);
 
-/// Draws magnitude and phase of frequency responses. Returns SVG. More than 60 dB below the largest magnitude, and more than
-/// 720° below the largest phase, nothing is drawn: so small a response is rounding and leakage of the window.
+/// Draws magnitude and phase of frequency responses. Returns SVG. Nothing is drawn more than 60 dB below the largest
+/// magnitude or more than 720° below the largest phase, because so small a response is only rounding and leakage of the
+/// window.
 #[must_use]
 pub fn frequency(plot: &FrequencyPlot<'_>) -> Picture {
     let description = format!("{}: magnitude and phase against frequency", plot.title);
@@ -79,7 +80,7 @@ pub fn frequency(plot: &FrequencyPlot<'_>) -> Picture {
         let Some(gain) = range(&gains, &measured_gains, DEPTH) else {
             return nothing(canvas, plot.title, "There is nothing to draw.");
         };
-        // A phase is drawn where its magnitude is.
+        // A phase is drawn only where its magnitude is drawn.
         let phase = |[_, magnitude, phase]: &[f64; 3]| match decibels(*magnitude) >= gain.0 {
             true => *phase,
             false => f64::NAN,
@@ -146,7 +147,8 @@ pub fn frequency(plot: &FrequencyPlot<'_>) -> Picture {
     })
 }
 
-/// Lowest and highest value of a panel, at most `depth` apart. Limits count only as far as a tenth of `depth` beyond.
+/// Lowest and highest value of a panel, at most `depth` apart. The limits of measured points widen this range by at
+/// most a tenth of `depth` at each end.
 fn range(curves: &[Vec<(f64, f64)>], measured: &[Measured], depth: f64) -> Option<(f64, f64)> {
     let values = curves.iter().flatten().map(|point| point.1);
     let (low, high) = extent(values.chain(measured.iter().map(|point| point.1)))?;
@@ -234,7 +236,7 @@ mod tests {
         ] {
             assert!(said.contains(word), "{word} in {said}");
         }
-        // The phase of the last point is 3600° below: the axis ends before.
+        // The phase of the last point is 3600° lower, so the axis ends before it.
         assert!(!said.contains("−3600"), "{said}");
     }
 

@@ -51,8 +51,8 @@ const RESIDUAL: f64 = 120.0;
 /// Draws one record: the output with its scatter and the models' free-runs, the command,
 /// and the residual (measured − model) against the noise level. Returns SVG.
 ///
-/// The scale follows the measurement; a model that leaves it by more than the range of
-/// the data runs along the edge of the panel.
+/// The scale follows the measurement. A model that deviates from the measured range by more than
+/// this range is drawn along the edge of the panel.
 #[must_use]
 pub fn overlay(plot: &Overlay<'_>) -> Picture {
     let description = format!("{}: measured output and model", plot.title);

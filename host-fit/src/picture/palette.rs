@@ -58,8 +58,8 @@ const DARK: [(Colour, Colour); 12] = [
     (SKY, Colour(140, 208, 250)),
 ];
 
-/// CSS rules that turn a picture inside `scope` dark: author rules win over the
-/// presentation attributes of SVG, so the picture itself stays a light one.
+/// CSS rules that turn a picture inside `scope` dark: author rules win over the presentation
+/// attributes of SVG, so the picture's own colours stay those for light pages.
 pub(super) fn dark_rules(scope: &str) -> String {
     let mut css = String::new();
     for (light, dark) in DARK {

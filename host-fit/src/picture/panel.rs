@@ -110,7 +110,8 @@ impl Panel {
             ],
             Ink::new(RULE, 1.25),
         );
-        // Next to the ticks: at the picture's edge, or where a panel of a row begins.
+        // The label is next to the ticks: at the edge of the picture, or where a panel of a row
+        // begins.
         let begins = self.left - left_edge([&self.y]);
         let begins = if begins > 60.0 { begins } else { 0.0 };
         canvas.upright(

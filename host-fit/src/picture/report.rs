@@ -176,7 +176,8 @@ impl Report {
         columns: &[Column<'_>],
         rows: &[Vec<S>],
     ) -> &mut Self {
-        // Not within the table, which may be wider than a phone: a caption is not scrolled to be read.
+        // The caption is outside the table element: a table may be wider than a phone, but its caption
+        // must be readable without scrolling.
         if !caption.is_empty() {
             self.push(format_args!("<p class=\"caption\">{}</p>", inline(caption)));
         }
@@ -254,7 +255,7 @@ impl Report {
     /// A line at the foot of the page: tool version, data hash, seed, command.
     pub fn provenance(&mut self, name: &str, value: &str) -> &mut Self {
         let line = (name.to_owned(), value.to_owned());
-        // Parts of one page often share them.
+        // Several parts of a page often have the same line.
         if !self.provenance.contains(&line) {
             self.provenance.push(line);
         }

@@ -98,7 +98,8 @@ fn bars(
     bars
 }
 
-/// Columns for each of `lines` thinned lines, so that the size of a picture does not depend on its contents.
+/// Columns for each of `lines` decimated lines, so that the size of a picture does not depend on its
+/// contents.
 pub(super) fn columns(width: f64, lines: usize) -> usize {
     /// Points in all lines of a picture; a point takes 10 bytes.
     const POINTS: f64 = 20_000.0;

@@ -46,7 +46,7 @@ pub(super) fn square_response(samples: usize) -> (Vec<f64>, Vec<f64>) {
         .unzip()
 }
 
-/// Nothing, one sample, constants, gaps, infinities, extremes.
+/// Unusual series: empty, one sample, constants, gaps, infinities, extreme values.
 pub(super) fn absurd_series() -> Vec<Vec<f64>> {
     vec![
         vec![],

@@ -262,7 +262,7 @@ mod tests {
         assert!(words(&svg).contains("time since rising edge (ms)"));
         assert!(words(&svg).contains("explains 74 %"));
         assert_eq!(worst(&bins), Some(1));
-        // One bar and the legend.
+        // The colour occurs in one bar and in the legend.
         let fill = format!("fill=\"{VERMILLION}\" opacity");
         assert_eq!(svg.matches(&fill).count(), 2);
     }

@@ -61,7 +61,7 @@ impl Rest {
     }
 }
 
-/// A straight-line fit of y to a constant and one shape.
+/// A least-squares fit of y by a constant and one shape.
 struct Shape {
     /// Sum of squares of the residual.
     left: f64,
@@ -108,7 +108,8 @@ impl Beginning {
         let (dead_time, time) = (reference.dead_time, reference.time_constant);
         let changes = |u: &f64| (u - first).abs() > 1e-9 * first.abs().max(1e-9);
         let change = record.u.iter().position(changes).unwrap_or(record.len());
-        // The response to an edge at the first sample comes before that to the first edge within the record.
+        // If an edge is at the first sample, the response to it comes before the response to the first edge
+        // within the record.
         let known_edge = (held - first).abs() > 1e-9 * first.abs().max(1e-9);
         let edge = if known_edge { 0 } else { change };
         // A switched input other than the command may act without delay.
@@ -151,7 +152,8 @@ impl Beginning {
             });
             each.min_by(|a, b| a.1.left.total_cmp(&b.1.left))
         };
-        // The samples before or just after the start of the response decide between the two.
+        // The samples before and just after the start of a response decide between a relaxation and
+        // a response to an edge.
         let early = &y[..window.min((RULES.early * dead_time).ceil() as usize + 5)];
         let (Some(relaxes), Some(relaxes_early)) = (relaxing(y), relaxing(early)) else {
             return in_mid_run(dead_time, time);
@@ -173,11 +175,11 @@ impl Beginning {
             _ => &relaxes,
         };
         if !moves(best) {
-            // If y does not move by then, it rests until the response to an edge begins.
+            // If y does not move in this interval, it rests until the response to an edge begins.
             return at_rest(held, felt(edge).min(record.len()));
         }
-        // A response to the record's own first edge that begins earlier than in the reference, for example that of
-        // a second-order plant.
+        // The response to the record's own first edge may begin earlier than in the reference, for example in a
+        // second-order plant.
         let sooner = [0.0, 0.15, 0.3, 0.45].map(|share| edge as f64 + share * dead_time);
         let sooner = sooner.into_iter().flat_map(|at| {
             let answer = move |k: usize, time: f64| 1.0 - (-(k as f64 - at).max(0.0) / time).exp();
@@ -189,7 +191,7 @@ impl Beginning {
         {
             return at_rest(held, edge);
         }
-        // A response to an edge at the first sample, of a command with two levels.
+        // If the command has two levels, the response may belong to an edge at the first sample.
         let other = two_levels(set).and_then(|levels| levels.into_iter().find(|u| *u != first));
         if let (Some((at, answer)), Some(other)) = (&answers_early, other)
             && !known_edge
@@ -200,7 +202,7 @@ impl Beginning {
             && *at >= 0.5 * (1.0 + RULES.surely_before) * dead_time
         {
             let rest = ((RULES.surely_before * at).floor() as usize).max(1);
-            // y must not move before that response.
+            // y must not move before the response `answer`.
             let trend = Shape::of(&y[..rest.min(window)], |k| k as f64);
             let noise = trend.left / (rest as f64 - 2.0).max(1.0);
             if rest < RULES.fewest_at_rest || trend.motion <= RULES.motion_over_noise * noise {
@@ -302,7 +304,8 @@ impl Beginning {
             let [low, high] = levels.fold([middle.level; 2], |[low, high], level| {
                 [low.min(level), high.max(level)]
             });
-            // Three times the rms residual of the reference, because it describes no flow exactly.
+            // The limit is three times the rms residual of the reference, because the reference
+            // describes no flow exactly.
             let from_end = (rest.level - reference.at_rest(*command)).abs();
             let is_elsewhere = alone && from_end > apart + 3.0 * reference.left_rms;
             let on_its_way = high - low > apart || is_elsewhere;
@@ -509,7 +512,7 @@ mod tests {
             let (u, y) = (command[from..to].to_vec(), y[from..to].to_vec());
             Record::new("part", Use::Identify, 0.001, u, y)
         };
-        // The second begins 20 samples after a rising edge, far below 1.
+        // The second record begins 20 samples after a rising edge, while y is still far below 1.
         let records = [part(0, 381), part(381, 900)];
         let reference = FirstOrder::fitted(&records).unwrap();
         let rests = |command: f64| Beginning {
@@ -535,7 +538,7 @@ mod tests {
             let (u, y) = (command[from..].to_vec(), y[from..].to_vec());
             Record::new("part", Use::Identify, 0.001, u, y)
         };
-        // The third begins while y rises.
+        // The third record begins while y rises.
         let records = [from(0), from(301), from(650)];
         let reference = FirstOrder::fitted(&records).unwrap();
         let mut beginnings = records
@@ -555,7 +558,7 @@ mod tests {
         assert_eq!((beginnings[0].command, beginnings[0].follow), (0.0, 0));
         let edge_before = beginnings[1];
         assert!(edge_before.command == 0.0 && edge_before.rest > 0 && edge_before.follow > 20);
-        // Without further edges only the response to the first can be scored.
+        // Without further edges only the response to the first edge can be scored.
         let short = Record {
             u: records[1].u[..200].to_vec(),
             ..records[1].clone()

@@ -9,9 +9,9 @@ use crate::model::CommandRange;
 
 /// The range of the command of `records`.
 ///
-/// Of two levels, no jet is the lower one if y rises with u, or if records rest under it. Otherwise it is the upper
-/// one (a normally open valve, an inverted relay). Graded commands are fractions of a full jet if they cover enough
-/// of 0 … 1; otherwise their range is used.
+/// If the command has two levels, the lower one means no jet if y rises with u, or if records rest under the lower
+/// level. Otherwise the upper one means no jet (a normally open valve, an inverted relay). Graded commands are
+/// fractions of a full jet if they cover enough of 0 … 1; otherwise their range is used.
 pub(super) fn range_of(
     records: &[Record],
     beginnings: &[Beginning],

@@ -100,7 +100,7 @@ impl<'a> Rests<'a> {
             values.iter().map(|value| value - common).collect()
         };
         let (levels, means) = (centred(&self.levels()), centred(&means));
-        // Σ (m − z)² < Σ m².
+        // Tests whether Σ (m − z)² < Σ m².
         let nearer = levels.iter().zip(&means).map(|(z, m)| z * (z - 2.0 * m));
         nearer.sum::<f64>() < 0.0
     }
@@ -228,7 +228,7 @@ pub struct MovingZero {
     pub lowest: (String, f64),
     /// The record that rests highest, and its level, y.
     pub highest: (String, f64),
-    /// Variance of the zeros themselves.
+    /// Variance of the offsets themselves, without noise.
     zeros: f64,
     /// Variance of noise that is constant throughout a rest.
     slower: f64,
@@ -405,7 +405,7 @@ fn subtract(record: &mut Record, zero: f64) {
 impl fmt::Display for MovingZero {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let ((low, lowest), (high, highest)) = (&self.lowest, &self.highest);
-        // As many digits as are needed to distinguish the two levels.
+        // The numbers have as many digits as are needed to distinguish the two levels.
         let apart = (highest - lowest).abs().max(f64::MIN_POSITIVE);
         let digits = 2
             + (lowest.abs().max(highest.abs()) / apart)
@@ -514,7 +514,7 @@ mod tests {
         };
         assert!(moves(&[0.0, 0.011, 0.019, 0.032, 0.04, 0.05, 0.06]));
         assert!(!moves(&[0.032, 0.0, 0.05, 0.019, 0.06, 0.04, 0.011]));
-        // Less than the difference of two rests that slow noise produces.
+        // The offsets differ by less than two rests that are affected by slow noise.
         assert!(!moves(&[0.0, 0.005, 0.01, 0.016, 0.02, 0.026, 0.03]));
     }
 
@@ -548,7 +548,7 @@ mod tests {
         let records = [("a", 0.0), ("b", 0.006), ("c", -0.005)].map(|(n, zero)| resting(n, zero));
         let moves = |left: f64| MovingZero::of(&records, &[short; 3], 0.0, || left).is_some();
         assert!(moves(0.006));
-        // Slow noise as large as the difference of the offsets.
+        // The slow noise is as large as the difference of the offsets.
         assert!(!moves(0.02));
     }
 
@@ -636,7 +636,7 @@ mod tests {
         // In the corrected records no offset moves.
         assert!(MovingZero::by_response(&tared).is_none());
         assert!(MovingZero::by_response(&records([0.3; 3], false)).is_none());
-        // A misfit of the response may look like an offset.
+        // A misfit of the response may look like an offset, so no offset is reported.
         assert!(MovingZero::by_response(&records([0.0, 0.05, 0.02], true)).is_none());
     }
 }

@@ -35,8 +35,9 @@ pub(crate) fn correlation_length(block: usize) -> f64 {
     (block as f64 / RULES.correlation_times).max(1.0)
 }
 
-/// p-value of "the sum of these independent blocks is above 0". Their scatter is estimated from the median absolute
-/// deviation, so that an error in few blocks does not inflate it. 1 for fewer than three blocks.
+/// p-value of the null hypothesis that the sum of these independent blocks is not above 0. Their scatter is
+/// estimated from the median absolute deviation, so that an error in few blocks does not inflate it. 1 for fewer
+/// than three blocks.
 pub(crate) fn p_above(blocks: &[f64]) -> f64 {
     let n = blocks.len() as f64;
     if n < 3.0 {
@@ -48,7 +49,7 @@ pub(crate) fn p_above(blocks: &[f64]) -> f64 {
     student(mean, NORMAL * deviation / n.sqrt(), n - 1.0)
 }
 
-/// One-sided p-value of "this estimate with this standard error is above 0".
+/// One-sided p-value of the null hypothesis that the true value of this estimate is not above 0.
 pub(crate) fn student(estimate: f64, error: f64, degrees: f64) -> f64 {
     if error <= 0.0 {
         return if estimate > 0.0 { 0.0 } else { 1.0 };

@@ -305,7 +305,7 @@ mod tests {
     /// blocks, 3.1.
     #[test]
     fn few_blocks_have_to_say_more() {
-        // 2.7 standard errors above 0, whatever n.
+        // The sum is 2.7 standard errors above 0 for every n.
         let gains = |n: usize| -> Vec<f64> {
             let apart = (n as f64).sqrt() / (2.7 * 1.4826);
             (0..n)

@@ -126,7 +126,7 @@ fn energies(transform: &dyn RealToComplex<f64>, x: &[f64], limits: &[f64]) -> Ve
     let mean = x.iter().sum::<f64>() / n as f64;
     let mut deviations: Vec<f64> = x.iter().map(|x| x - mean).collect();
     let mut lines = transform.make_output_vec();
-    // Cannot fail: the transform was planned for pieces of this length.
+    // This cannot fail, because the transform was planned for pieces of this length.
     let _ = transform.process(&mut deviations, &mut lines);
     let band = |band: &[f64]| {
         let within = (band[0].floor() as usize + 1)..=(band[1] as usize);

@@ -303,7 +303,8 @@ mod tests {
 
     #[test]
     fn permuted_points_are_one_and_the_first_success_ends_the_list() {
-        // [8,9] and the second [7,7] are known; [0,1] comes after the success.
+        // [8,9] and the second [7,7] are in the cache; [0,1] comes after the success and is not
+        // evaluated.
         let expected = (
             Some(Success {
                 point: vec![1, 2],

@@ -313,7 +313,8 @@ mod tests {
 
     #[test]
     fn a_staircase_with_ripples_needs_the_kicks() {
-        // A staircase with steps three wide, a ripple of local minima, and the global minimum at (60, 60).
+        // The function is a staircase with steps three wide and a ripple of local minima; its global
+        // minimum is at (60, 60).
         fn staircase(x: &[f64]) -> f64 {
             x.iter()
                 .map(|v| ((v - 60.0) / 3.0).trunc().abs() + 3.0 * (1.0 - ((v - 60.0) * 0.7).cos()))
@@ -341,7 +342,8 @@ mod tests {
 
     #[test]
     fn it_stops_only_when_every_neighbour_is_worse() {
-        // A narrow diagonal valley: most random polls at one tick miss ±1 on a single axis.
+        // The function has a narrow diagonal valley, in which most random polls at one tick do not
+        // contain ±1 along a single axis.
         let variables = (0..8)
             .map(|i| Variable::integer(format!("d{i}"), -100, 100))
             .collect();

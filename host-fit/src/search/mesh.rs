@@ -199,7 +199,7 @@ mod tests {
             mesh.enlarge(&[500]);
             seen.push((mesh.frame_sizes()[0], mesh.mesh_sizes()[0]));
         }
-        // For a value larger than at the start the mesh keeps its initial size, 10^(2−1).
+        // For a frame larger than at the start the mesh keeps its initial size, 10^(2−1).
         assert_eq!(
             seen,
             [(100, 10), (200, 10), (500, 10), (500, 10), (500, 10)]

@@ -1,9 +1,8 @@
 //! Mesh adaptive direct search (MADS) over integers and granular reals.
 //!
-//! The parts are separate: the [`Mesh`] is a type of its own, search steps are
-//! plug-ins ([`SearchStep`]), the [`Evaluator`] owns cache, order and threads,
-//! and a [`StopReason`] is data with words. Repeatable bit for bit by seed,
-//! whatever the number of threads.
+//! The parts are separate: the [`Mesh`] is a type of its own, search steps are plug-ins ([`SearchStep`]), the
+//! [`Evaluator`] owns cache, order and threads, and a [`StopReason`] is a value with a description. Repeatable bit for
+//! bit by seed, whatever the number of threads.
 //!
 //! ```
 //! use host_fit::search::{Evaluation, Point, Problem, Settings, Shake, Variable, minimise};

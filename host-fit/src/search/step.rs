@@ -84,8 +84,8 @@ impl<P: Problem> SearchStep<P> for Speculative {
     }
 }
 
-/// The improvement of a [`Settle`]: from the incumbent to an end point and, if it is better, the success. It also
-/// counts the points screened.
+/// The improvement that a [`Settle`] applies. It starts from the incumbent and returns its end point and, if this
+/// is better, the success. It also counts the points screened.
 pub type Improve<P> = fn(
     &mut Evaluator<'_, P>,
     &Around<'_>,

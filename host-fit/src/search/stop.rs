@@ -25,7 +25,7 @@ impl StopReason {
         matches!(self, Self::LocallyOptimal | Self::NothingToSearch)
     }
 
-    /// Whether the call is the cause, not the data.
+    /// Whether the search ended because of the way in which it was called, not because of the data.
     pub fn was_usage_issue(self) -> bool {
         matches!(self, Self::NothingToSearch)
     }

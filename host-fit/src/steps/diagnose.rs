@@ -230,9 +230,9 @@ pub fn diagnose(
     })
 }
 
-/// Recomputes the errors of the ladder's models as `compare` does, and replaces models worse than the given
-/// one by it. Returns the final error if it is not that of whole runs over `validate` records, but of
-/// restarted runs or cross-validation.
+/// Recomputes the errors of the ladder's models as `compare` does, and replaces a model that is worse than
+/// the given one by the given one. Returns the final error if it is not that of whole runs over `validate`
+/// records, but of restarted runs or cross-validation.
 fn as_written(diagnosis: &mut Diagnosis, given: &Model, records: &[Record]) -> Option<f64> {
     let judged = diagnosis.ladder.last().map(|rung| rung.validate_rmse);
     for rung in &mut diagnosis.ladder {

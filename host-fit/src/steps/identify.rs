@@ -300,7 +300,7 @@ fn overfitted(scores: &Scores, model: &Model) -> Option<String> {
         finite_fit(scores.identify.as_ref())?,
         finite_fit(scores.validate.as_ref())?,
     );
-    // Only advice that the model does not follow already.
+    // The remark gives only advice that the model does not follow already.
     let fewer = match (model.state_lags.len(), model.product_lags.len()) {
         (0..=1, 0..=1) => "",
         (0..=2, 0..=2) => "fewer lags (`--n1 1 --n2 1`), ",
@@ -314,9 +314,9 @@ fn overfitted(scores: &Scores, model: &Model) -> Option<String> {
     })
 }
 
-/// Identifies a model on the identify records of `set`. The delays are found by search, and the coefficients by
-/// least squares within it. If the objective is the free run, the coefficients are refined on it, and kept if the
-/// validation error falls.
+/// Identifies a model on the identify records of `set`. The delays are found by search, and for each candidate the
+/// coefficients by least squares. If the objective is the free run, the coefficients are refined on it, and kept
+/// if the validation error falls.
 ///
 /// ```
 /// use host_fit::data::DataSet;

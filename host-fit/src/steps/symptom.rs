@@ -14,8 +14,8 @@ pub(super) type Estimates = BTreeMap<String, ParameterEstimate>;
 #[derive(Clone, Copy)]
 struct Symptom {
     effect: &'static str,
-    /// The behaviour that records show when it is named, in words that fit any plant. The test certifies this part.
-    /// `{frequency}` is replaced by the fitted parameter.
+    /// The behaviour that records show when the effect is named, in words that fit any plant. The test certifies
+    /// this part. `{frequency}` is replaced by the fitted parameter.
     shown: &'static str,
     /// The bench check that would confirm the interpretation in a flow.
     check: Option<&'static str>,

@@ -259,7 +259,8 @@ fn fall(diagnosis: &Diagnosis, with: &str) -> String {
     }
 }
 
-/// The step of the ladder with the fewest lags, if the given model fits as well as the final one: it imitates the effects.
+/// The step of the ladder with the fewest lags, if the given model fits as well as the final one. The given model then
+/// imitates the effects.
 fn imitated(diagnosis: &Diagnosis) -> Option<&Rung> {
     let [given, last] = [diagnosis.ladder.first()?, diagnosis.ladder.last()?];
     let lags_do = last.validate_rmse > (1.0 - RULES.worthwhile) * given.validate_rmse;
@@ -271,7 +272,7 @@ fn imitated(diagnosis: &Diagnosis) -> Option<&Rung> {
 fn behaviour(diagnosis: &Diagnosis) -> String {
     let each = diagnosis.missing.iter().map(|name| {
         let text = shown(name, diagnosis.parameters.get(name));
-        // For a user's own effect, its summary.
+        // For a user's own effect, its summary is used.
         let summary = || diagnosis.model.spec(name).map(|spec| spec.summary);
         text.or_else(|| summary().map(str::to_owned))
             .unwrap_or_else(|| format!("the behaviour of `{name}`"))
@@ -279,7 +280,8 @@ fn behaviour(diagnosis: &Diagnosis) -> String {
     each.collect::<Vec<_>>().join("; and ")
 }
 
-/// The claim: effects by name in a flow, by behaviour elsewhere, each with its equivalence set.
+/// The claim of a diagnosis. In a flow, effects are stated by name, in other plants by behaviour,
+/// each with its equivalence set.
 fn claim(diagnosis: &Diagnosis, plant: Plant) -> String {
     match plant {
         Plant::Flow => missing(&diagnosis.missing, &diagnosis.sets),

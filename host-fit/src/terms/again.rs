@@ -12,8 +12,8 @@ use model_core::effect::Spec;
 
 impl Search<'_> {
     /// `hypothesis` with a second copy of one of its effects, fitted from the best starting points of its card.
-    /// `None` if it has no effect except a delay law, if no copy is stable, or if after a few iterations every copy
-    /// is far from an error of `enough`.
+    /// `None` if it has no effect except a delay law, if no copy is stable, or if the error of every copy is still
+    /// far above `enough` after a few iterations.
     pub(crate) fn again(
         &self,
         hypothesis: &Hypothesis,

@@ -19,9 +19,9 @@ use crate::simulate::SimulateError;
 use model_core::effects::{ConstantDelay, SaturatingDelay};
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Level of y, in inner units, above which a separate delay of the attached flow is tried …
+/// Level of y, in inner units, above which a separate delay of the attached flow is tried.
 const LEVEL: f64 = 0.6;
-/// … and the least difference between that delay and the delay at rest, samples.
+/// Least difference between the delay of the attached flow and the delay at rest, samples.
 const LEAST_RISE: f64 = 4.0;
 
 /// Averaging times of y that are tried with a delay law in addition to that of eq. (1), samples. A flow that
@@ -220,8 +220,8 @@ pub fn base_model(
     }))
 }
 
-/// `best`, or the first of the `others` without a diverging free run over the records if that of `best` diverges: close to
-/// an instability, the rounding of another unit decides. `best` if all diverge.
+/// `best` if its free run over the records does not diverge; otherwise the first of the `others` whose free run does
+/// not. `best` if all diverge. Close to an instability, rounding in other units may decide whether a run diverges.
 fn stable_one(best: Model, others: impl Iterator<Item = Model>, records: &[Record]) -> Model {
     let is_stable = |model: &Model| {
         let runs = parallel::all(records, |record| model.free_run(record).ok());
@@ -305,7 +305,7 @@ fn with_average(model: &Model, law: &Delay, window: u32) -> Model {
     other
 }
 
-/// The delay law with a finite end that is closest to the law of `model`.
+/// The saturating delay law that is closest to the law of `model`.
 fn saturating(model: &Model) -> Delay {
     let at = |level: f64| model.delay.present(level, model.sample_period_s);
     let rise = at(0.0) - at(LEVEL);

@@ -34,8 +34,8 @@ impl Bench {
         let inner = units.records_in(&prepared.records);
         let mid_run = !prepared.at_rest;
         let options = FitOptions {
-            // Only in mid-run. For records that start at rest, the constant is the sensor's offset, which is a term of
-            // the search.
+            // A constant is fitted only in mid-run. For records that start at rest, the constant is the sensor's
+            // offset, which is a term of the search.
             constant: mid_run,
             ..FitOptions::default()
         };
@@ -67,7 +67,8 @@ fn restarted(model: &Model, records: &[Record], reference: Option<&FirstOrder>) 
     let drifts = |samples: &usize| {
         let learning = || records.iter().filter(|record| record.role == Use::Identify);
         let cut = pieces_of(learning(), *samples);
-        // An integrator keeps the noise of its first sample: the mean error of a whole run is not a drift.
+        // An integrator keeps the noise of its first sample as a constant error. The mean error of a whole
+        // run is therefore not a drift.
         mean_square(model, learning(), true) > mean_square(model, cut.iter(), false)
     };
     restart_after(model, records).filter(|samples| !forgets && drifts(samples))

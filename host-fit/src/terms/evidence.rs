@@ -59,7 +59,8 @@ impl HeldOut {
     }
 }
 
-/// One-sided p-value of "`better` has the smaller validation error than `worse`".
+/// One-sided p-value of the null hypothesis that the validation error of `better` is not smaller than that of
+/// `worse`.
 ///
 /// With d the difference of the two runs and m the mean of their errors, the gain Σ e² − Σ e'² is 2 Σ m·d. It is
 /// positive if the regression of m on d has a positive slope. The test is Student's t test on that slope. The
@@ -67,7 +68,7 @@ impl HeldOut {
 /// differ. A paired test on the blocks' gains would lose power if the gain is concentrated in few blocks.
 pub(crate) fn p_value(worse: &HeldOut, better: &HeldOut) -> f64 {
     let block = better.block;
-    // Per block: Σ m·d and Σ d·d.
+    // Each block gives Σ m·d and Σ d·d.
     let mut blocks = Vec::new();
     for (worse, better) in worse.errors.iter().zip(&better.errors) {
         let (worse, better) = last_of_both(worse, better);
@@ -96,7 +97,8 @@ fn last_of_both<'a>(a: &'a [f64], b: &'a [f64]) -> (&'a [f64], &'a [f64]) {
     (&a[a.len() - n..], &b[b.len() - n..])
 }
 
-/// p-value of "Σ e² exceeds `margin` times Σ σ²" over blocks; σ² per sample in the shape of the errors.
+/// p-value of the null hypothesis that Σ e² does not exceed `margin` times Σ σ², over blocks; σ² per
+/// sample in the shape of the errors.
 pub(crate) fn p_above_noise(held_out: &HeldOut, variance: &[Vec<f64>], margin: f64) -> f64 {
     let block = held_out.block;
     let mut excess = Vec::new();
@@ -138,7 +140,7 @@ mod tests {
             let (a, b) = (held_out(&mut rng), held_out(&mut rng));
             alarms += usize::from(p_value(&a, &b) < 0.05);
         }
-        // Binomial(400, 0.05): 20 ± 4.4.
+        // In 400 trials, 20 ± 4.4 false alarms are expected.
         assert!((7..=35).contains(&alarms), "{alarms} of {trials}");
     }
 
@@ -167,7 +169,7 @@ mod tests {
             alarms += usize::from(p_value(&off_by(0.5), &off_by(-0.5)) < 0.05);
             found += usize::from(p_value(&off_by(1.0), &off_by(0.0)) < 0.01);
         }
-        // Six clusters: the level of the test is not exact.
+        // With six clusters the level of the test is not exact.
         assert!((5..=45).contains(&alarms), "{alarms} of {trials}");
         assert!(found > 320, "{found} of {trials}");
     }

@@ -284,7 +284,7 @@ mod tests {
         Search::silent(judge, 0, &NEVER)
     }
 
-    /// A fit of that flow with these terms.
+    /// A fit of a first-order flow with these terms.
     fn begun(judge: &Judge, terms: &[Term]) -> Fit {
         let lean = Model {
             a: vec![0.98],
@@ -344,7 +344,7 @@ mod tests {
             (&[1][..], &[1][..])
         );
         assert_eq!(model.effects.len(), 1);
-        // Models that have only lags, or only an effect, keep all terms.
+        // Models with only lags, or with only an effect, keep all terms.
         assert!(search.without_lags(&anew, &root).is_none());
         assert!(search.without_lags(&root, &root).is_none());
     }

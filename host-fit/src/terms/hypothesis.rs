@@ -99,7 +99,8 @@ mod tests {
     use crate::terms::Bench;
     use model_core::effects::spec;
 
-    /// The gain of a starting vortex ends at 3; the lower threshold of a hysteresis ends at the upper one.
+    /// The range of the gain of a starting vortex ends at 3; the range of the lower threshold of a
+    /// hysteresis ends at the upper threshold.
     #[test]
     fn an_effect_at_the_end_of_its_range_reaches_a_bound() {
         let records = records(&[], &[], 3);

@@ -186,7 +186,7 @@ mod tests {
         let inputs = measured_inputs(&records);
         let names: Vec<&str> = inputs.iter().map(|input| input.spec().name).collect();
         assert_eq!(names, ["input-heater-2"]);
-        // The reading in another unit, a copy of the command, a clock.
+        // The channels are the reading in another unit, a copy of the command, and a clock.
         for record in &mut records {
             record.u = (0..900)
                 .map(|k| f64::from(u8::from(k % 200 > 100)))
@@ -204,7 +204,7 @@ mod tests {
             .map(|i| i.spec().name)
             .collect();
         assert_eq!(names, ["input-heater-2"]);
-        // A record that lacks the channel.
+        // One record lacks the channel.
         assert!(measured_inputs(&[records[0].clone(), record(&[])]).is_empty());
     }
 

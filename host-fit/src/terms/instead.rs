@@ -19,7 +19,7 @@ use crate::order;
 use crate::parallel;
 use model_core::effect::Place;
 
-/// An effect with the base terms that are predicted to be needed beside it.
+/// An effect together with the base terms that are predicted to be needed with it.
 struct Begun {
     terms: Vec<Term>,
     fit: Fit,
@@ -63,8 +63,8 @@ impl Search<'_> {
         };
         let proposals = self.each_effect(lean.model());
         let alone = parallel::some(&proposals, |proposal| self.alone(lean.model(), proposal));
-        // A delay by whole samples has no derivative: a fit that starts with a path of the jets ends with it. Effects are
-        // therefore fitted without such terms, too.
+        // A delay by whole samples has no derivative, so a fit that starts with a term in the jet path keeps this term.
+        // Effects are therefore fitted without such terms, too.
         let in_the_jet = |term: &Term| term.place() == Some(Place::Jet);
         let mut bases = vec![bases];
         if bases[0].iter().any(in_the_jet) {
@@ -207,13 +207,13 @@ impl Screen<'_> {
     /// The `terms` of this model that are not needed by a first-order prediction, and by how much ln of the error then
     /// rises. A term is not needed if its penalty is larger than the rise. `sum` is the sum of squares of the error.
     ///
-    /// Taking terms away changes the free run by Σd; the other parameters follow, and what remains of Σd raises the
-    /// sum of squares.
+    /// Removing terms changes the free run by Σd. The other parameters compensate part of Σd, and the remaining part
+    /// raises the sum of squares.
     fn needless(&self, terms: &[Term], lean: &Model, sum: f64) -> (Vec<usize>, f64) {
         /// The change of the free run when a term is taken away.
         struct Taken {
             index: usize,
-            /// Coordinates of the term; these cannot follow.
+            /// Coordinates of the term; these cannot compensate its removal.
             coordinates: Vec<usize>,
             /// Components along the basis.
             along: Vec<f64>,
@@ -278,8 +278,8 @@ impl Screen<'_> {
         (dropped, loss(&set))
     }
 
-    /// The squared length of what remains of a change along the basis when all parameters but those with these
-    /// coordinates follow it.
+    /// Squared length of the part of a change along the basis that remains after all parameters except those
+    /// with these coordinates have compensated it.
     fn left_by_others(&self, along: &[f64], without: &[usize]) -> f64 {
         let free = self.made_by.iter().enumerate();
         let columns: Vec<Vec<f64>> = free
@@ -290,7 +290,7 @@ impl Screen<'_> {
                 column
             })
             .collect();
-        // Fixed delays, which are the last directions, follow too.
+        // Fixed delays, which are the last directions, can compensate it too.
         let along = &along[..self.made_by.len()];
         let n = columns.len();
         let products: Vec<f64> = (0..n * n)

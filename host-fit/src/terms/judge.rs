@@ -364,7 +364,7 @@ impl Judge {
         (held_out.rmse().powi(2) - self.noise_rmse().powi(2)).max(0.0)
     }
 
-    /// p-value of "the error is not above `margin` times the noise level".
+    /// p-value of the null hypothesis that the error is not above `margin` times the noise level.
     pub(crate) fn p_above_noise(&self, held_out: &HeldOut, margin: f64) -> f64 {
         p_above_noise(held_out, &self.floor, margin * margin)
     }

@@ -82,7 +82,8 @@ pub(super) fn second_order(
     let period = first.sample_period_s;
     let found = Baselines::second_order(&judge.learning(0))?;
     let linear = one_input(first, found.recursion(period));
-    // Two lags in series, with the products of the first order; and the linear one, which may be underdamped.
+    // The candidates are two lags in series, with the products of the first order, and the linear second
+    // order, which may be underdamped.
     let in_series = found.time_constants_s.map(|[_, lag]| {
         let lag = lag / period;
         let mut model = first.clone();

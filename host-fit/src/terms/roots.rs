@@ -36,7 +36,8 @@ impl Search<'_> {
                 model.start = Start::Measured;
             }
         }
-        // A base that was fitted without the kept effects may diverge with them; the given one was fitted with them.
+        // A base that was fitted without the kept effects may diverge with them. The given model was fitted with
+        // them and is then refitted instead.
         let refitted = self.judge.refitted(&model);
         let mut judged = refitted.or_else(|error| self.judge.refitted(&own).map_err(|_| error))?;
         if !self.judge.on_off {
@@ -101,14 +102,14 @@ impl Search<'_> {
             .collect()
     }
 
-    /// Whether an effect that is not in `base` is fitted from fresh starts, because a few iterations do not return from the
-    /// parameters of a base that was fitted without it.
+    /// Whether an effect that is not in `base` is fitted from fresh starts: if `base` was fitted without the effect, a
+    /// few iterations from its parameters may not converge.
     pub(super) fn is_fitted_anew(&self, base: &Model, spec: &Spec) -> bool {
         !base.has_effect(spec.name) && needs_fresh_starts(base, spec)
     }
 
-    /// `base` with an effect, from fresh starts; `None` if the records cannot identify the effect beside the fitted dead
-    /// time.
+    /// `base` with an effect, fitted from fresh starts. `None` if records with the fitted dead time cannot identify the
+    /// effect.
     pub(super) fn fitted_anew(
         &self,
         base: &Model,

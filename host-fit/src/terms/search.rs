@@ -205,8 +205,8 @@ impl Search<'_> {
                     chosen.push((0, true));
                 }
             }
-            // At the end of the search a few more rounds screen terms on fits with an effect at a bound, if their
-            // error is below that of every result. With a further term the effect may leave the bound.
+            // At the end of the search, fits with an effect at a bound get a few more rounds of screening, if
+            // their error is below that of every result. With a further term the effect may leave the bound.
             if chosen.is_empty()
                 && from_bound < RULES.rounds_after
                 && let Some(bent) = least_of(&all, |i| all[*i].bent && !all[*i].expanded)
@@ -265,7 +265,7 @@ impl Search<'_> {
         for hypothesis in finished {
             keep(all, hypothesis);
         }
-        // Only hypotheses with a lower error than every result.
+        // Only hypotheses with a lower error than every result are chosen.
         let least = all[best(all, |_| true)].score() - RULES.price;
         for hypothesis in bent.into_iter().filter(|bent| bent.score() < least) {
             keep(all, hypothesis);
@@ -304,7 +304,8 @@ impl Search<'_> {
         if let Some(new) = new.filter(|i| open(i) && near(*i)) {
             chosen.push((new, self.effects));
         }
-        // Two lines of descent are followed until the worse one also has more parameters.
+        // The searches from both starting points continue until the worse one also has more
+        // parameters.
         let line = all[end].from_given;
         let other = leading(all, |i| all[*i].from_given != line);
         if let Some(other) = other.filter(open)
@@ -397,8 +398,9 @@ impl Search<'_> {
             Some((score(rmse, parent.cost() + cost), at, fit))
         });
         order::ascending(&mut brief, |one| one.0);
-        // Refitted in full in any case: the best without effects, and the best on each screened model, for which
-        // the error of a brief fit is less informative. Proposals that converge to the same model are fitted once.
+        // Two kinds of fits are refitted in full in any case: the best without effects, and the best on each
+        // screened model, for which the error of a brief fit is less informative. Proposals that converge to the
+        // same model are fitted once.
         let mut leading: Vec<(usize, Fit)> = Vec::new();
         let (mut has_bare, mut met): (bool, Vec<Vec<Term>>) = (false, Vec::new());
         let mut heirless: Vec<usize> = pool.iter().map(|(index, _)| *index).collect();
@@ -553,7 +555,8 @@ fn keep(all: &mut Vec<Hypothesis>, mut hypothesis: Hypothesis) {
         _ => hypothesis.score() < other.score(),
     };
     if better {
-        // Candidates were already screened on this hypothesis, unless its terms have changed.
+        // Candidates were already screened on this hypothesis. They are screened again if its score
+        // has fallen by at least the penalty of one parameter.
         hypothesis.expanded = other.expanded && hypothesis.score() > other.score() - RULES.price;
         *other = hypothesis;
     }

@@ -284,7 +284,8 @@ impl Screen<'_> {
                 let physical = spec.parameters[index].sign == Sign::Either;
                 physical || parameters[index] * scale >= 0.0
             }
-            // If the change is not proportional to the amplitude, its sign and part of its size must remain.
+            // If the change is not proportional to the amplitude, the factor must be positive and not too
+            // small.
             None => spec.parameters.is_empty() || scale > RULES.some,
         }
     }

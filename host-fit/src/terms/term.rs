@@ -128,7 +128,7 @@ impl Term {
             let place = |x: f64| if card.is_logarithmic() { x.ln() } else { x };
             let (low, high) = (place(card.low), place(card.high));
             let near = RULES.bound * (high - low);
-            // An amplitude may be small.
+            // A low end of 0 is not a bound, because an amplitude may be small.
             let low_end = card.is_logarithmic() || card.low != 0.0;
             let at_low = low_end && place(*value) < low + near;
             card.low < card.high && (place(*value) > high - near || at_low)
@@ -540,7 +540,7 @@ fn faster(model: &Model) -> Option<(usize, usize, f64)> {
     let at = |lag: u16| model.state_lags.iter().position(|l| *l == lag);
     let (first, second) = (at(NEWEST)?, at(BEFORE)?);
     let (sum, product) = (model.a[first], -model.a[second]);
-    // The roots of λ² − sum·λ + product; the modulus of complex ones.
+    // The larger root of λ² − sum·λ + product, or the modulus of complex roots.
     let spread = sum * sum / 4.0 - product;
     let keep = if spread >= 0.0 {
         sum / 2.0 - spread.sqrt()

@@ -18,11 +18,11 @@ const PERIOD_S: f64 = 0.001;
 /// The inner units, expressed in the user's units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Units {
-    /// Sensor reading that is y = 0 inside.
+    /// Sensor reading that corresponds to y = 0 in inner units.
     pub zero: f64,
     /// Inner unit of y.
     pub y: f64,
-    /// The commands that are 0 (no jet) and 1 (full jet) inside.
+    /// The commands that correspond to 0 (no jet) and 1 (full jet) in inner units.
     pub command: CommandRange,
     /// Inner unit of time.
     pub time: f64,
@@ -41,7 +41,8 @@ impl Units {
     /// scale are written in the user's units, which are then kept.
     #[must_use]
     pub fn of(model: &Model, prepared: &Preparation) -> Self {
-        // A model's definition of a full jet is kept, because its jet effects are written for it.
+        // If the model has effects on the jet, its definition of a full jet is kept, because these
+        // effects are written for it.
         let command = if model.command.is_unit() && !has_jet_effects(model) {
             prepared.command
         } else {
@@ -203,7 +204,7 @@ impl Units {
             return;
         }
         if model.start == Start::Measured && model.effects.is_empty() {
-            // The recursion works on the sensor's reading: its constants absorb the shift.
+            // The recursion works on the sensor's reading, so its constant takes up the shift.
             let kept: f64 = 1.0 - model.a.iter().sum::<f64>();
             model.constant += by * kept;
             let count = model.product_lags.len();

@@ -14,7 +14,7 @@ const MOST_TOKENS: usize = 400;
 const DEEPEST: usize = 32;
 /// Punctuation of the subset.
 const PUNCTUATION: &str = "+-*/<>=!&|,;.";
-/// Keywords of Rust outside the subset, which the Rust parser would accept.
+/// The subset in words, for error messages.
 const SUBSET: &str = "allowed are numbers, names, + - * /, comparisons, && || !, `if … else …`, \
      `let`, and abs, min, max, sqrt, exp, cbrt, sin, cos, delayed, table";
 

@@ -42,7 +42,7 @@ pub(crate) struct Form {
 pub(crate) fn form(name: &str) -> Option<&'static Form> {
     static FORMS: OnceLock<Vec<Form>> = OnceLock::new();
     let forms = FORMS.get_or_init(|| {
-        // A test compiles all forms; one that does not compile counts as missing.
+        // A test checks that all forms compile; a form that does not compile counts as missing.
         let written: BTreeMap<String, Written> =
             toml::from_str(include_str!("forms.toml")).unwrap_or_default();
         let specs = SPECS.iter().chain(NUISANCES).chain(LAWS);
@@ -145,7 +145,7 @@ mod tests {
         }
     }
 
-    /// All hooks, with signals that reach every branch.
+    /// The results of all functions of an effect, for signals that reach every branch.
     fn run<T: Real>(effect: &impl Effect<T>) -> Vec<f64> {
         let number = T::from_f64;
         let mut state = effect.start();
@@ -180,7 +180,8 @@ mod tests {
         each.flatten().collect()
     }
 
-    /// Three quarters through each range, where other branches apply than at the starting values.
+    /// Parameters at three quarters of each range, where other branches apply than at the starting
+    /// values.
     fn far<T: Real>(spec: &Spec) -> Vec<T> {
         let each = spec.parameters.iter();
         each.map(|p| T::from_f64(p.low + 0.75 * (p.high - p.low)))

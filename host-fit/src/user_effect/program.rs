@@ -439,7 +439,7 @@ impl Unary {
 impl Binary {
     #[inline]
     pub(crate) fn of<T: Real>(self, x: T, y: T) -> T {
-        // Comparisons ignore derivatives, which `==` of dual numbers does not.
+        // `partial_cmp` ignores derivatives, while `==` of dual numbers compares them too.
         let equal = || x.partial_cmp(&y) == Some(Ordering::Equal);
         match self {
             Self::Add => x + y,

@@ -44,8 +44,8 @@ impl<T: Real, P: Past<T>, const A: usize> Past<T> for Ahead<'_, T, P, A> {
     }
 }
 
-/// Cache of the known part of the samples ahead: for each of the next 64 the sum of the terms with longer
-/// lags. One sum is recomputed per sample.
+/// Cache for the look-ahead: for each of the next 64 samples, the sum of the terms with longer lags,
+/// which read only the past. One sum is recomputed per sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Foreknown<T> {
     terms: [Known<T>; NEAR],

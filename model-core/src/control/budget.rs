@@ -18,7 +18,8 @@ pub struct Switches {
 pub struct Air {
     /// Allowed long-run share of time with the valve open, in 1/1000; 1000 means no limit.
     pub per_mille: u32,
-    /// Longest continuous blowing beyond the allowed share, from a full store of air, samples.
+    /// Longest continuous blowing that a full store of air allows beyond the allowed share,
+    /// samples.
     pub saved: u32,
 }
 
@@ -105,7 +106,8 @@ impl Air {
     /// Samples of continuous blowing that a full store of a designed budget gives.
     pub const SAVED: u32 = 1000;
 
-    /// The budget of `per_mille` with the usual store.
+    /// A limit of `per_mille` thousandths of the time, with a store of [`SAVED`](Self::SAVED)
+    /// samples.
     #[must_use]
     pub const fn of(per_mille: u32) -> Self {
         Self {

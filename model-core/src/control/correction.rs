@@ -1,7 +1,7 @@
-//! Corrections of a tracking law for model errors. The low-pass-filtered error of predictions made a delay
-//! ago is added to the present ones (Smith predictor), and a slow integral removes the remaining offset. Both
-//! respond to noise as little as possible: the bias has a dead band, and the integral slows down while the
-//! bias is constant.
+//! Corrections of a tracking law for model errors. The low-pass-filtered error of predictions made one delay
+//! earlier is added to the present predictions (Smith predictor), and a slow integral removes the remaining
+//! offset. Both respond to noise as little as possible: the bias has a dead band, and the integral slows down
+//! while the bias is constant.
 
 use crate::control::constants::Tracking;
 use crate::history::{DelayLine, Memory, Past};
@@ -67,7 +67,8 @@ impl<T: Real, const A: usize> Correction<T, A> {
         let flow = estimate + residual;
         let missed = flow - self.predictions.back(usize::from(law.lead));
         if reference != self.reference {
-            // The model error differs at another level of y, so integration has its full rate again.
+            // The model error differs at another level of y, so the integral starts again with its
+            // full rate.
             self.reference = reference;
             self.share = T::ONE;
         }
@@ -91,7 +92,8 @@ impl<T: Real, const A: usize> Correction<T, A> {
         if !(still && pushes_on == on) {
             let integral = self.integral + integral_rate * error;
             self.integral = limited(integral, law.correction_limit);
-            // The Riccati equation of an offset that drifts: dg/dt = settled gain squared − g².
+            // The gain g of a drifting offset follows a Riccati equation: dg/dt = (settled gain)² −
+            // g².
             let falls = self.share * self.share - law.settled * law.settled;
             self.share = self.share - law.integral_rate * falls;
         }
@@ -155,13 +157,13 @@ mod tests {
     fn the_integral_grows_to_its_limit_and_waits_for_a_valve_that_can_give_no_more() {
         assert!((after(13, 0, false).integral + 0.01).abs() < 1e-12);
         assert_eq!(after(1000, 0, false).integral, -0.3);
-        // Too much flow after a long time with the valve closed: the integral stops. With the valve open it does
-        // not.
+        // The friction is above the reference. After a long time with the valve closed the integral stops; with
+        // the valve open it does not.
         assert_eq!(after(1000, 12, false).integral, 0.0);
         assert_eq!(after(1000, 12, true).integral, -0.3);
     }
 
-    /// The relative integral rate after this many samples of a prediction error `missed` with a ripple of 0.01.
+    /// The corrections after `samples` samples with a constant prediction error `missed` and a ripple of 0.01.
     fn learnt(law: &Tracking<f64>, samples: u32, missed: f64) -> Correction<f64, 8> {
         let mut correction = Correction::none();
         for k in 0..samples {
@@ -181,7 +183,7 @@ mod tests {
         };
         let quiet = learnt(&law, 3000, 0.0);
         assert_eq!(quiet.bias, 0.0);
-        // The rate decreases to the final rate of the Riccati equation and not further.
+        // The rate falls to the final rate of the Riccati equation and no lower.
         assert!((quiet.share - 0.2).abs() < 0.005, "{}", quiet.share);
         // A changed model error moves the bias beyond its dead band, and resets the integral rate.
         let mut wrong = quiet;
@@ -190,7 +192,7 @@ mod tests {
         }
         assert!((wrong.bias - 0.08).abs() < 1e-3, "{}", wrong.bias);
         assert!(wrong.share > 0.8, "{}", wrong.share);
-        // Another reference resets it as well.
+        // A new reference resets the integral rate as well.
         let mut other = quiet;
         other.update(&law, 0.6, 0.6, Some(0.0), 0.6, (true, 0));
         assert!(other.share > 0.98, "{}", other.share);

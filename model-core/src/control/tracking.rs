@@ -178,7 +178,7 @@ impl<T: Real> Tracking<T> {
         let looks = !state
             .foreknown
             .begin(&model.recursion(), &state.model.outputs);
-        // The position to evaluate: the other one, if the valve may switch.
+        // If the valve may switch, the other position is evaluated, otherwise the present one.
         let look = if looks {
             self.look_ahead(model, state, was_on != may_switch, channels)
         } else {
@@ -248,7 +248,7 @@ impl<T: Real> Tracking<T> {
         } = self.anticipation;
         let halves = if on { opening } else { closing };
         let valve = u32::from(if on { self.opening } else { self.closing });
-        // Between two samples, their mean.
+        // If the anticipation ends between two samples, the mean of both is used.
         let (near, far) = (valve + halves / 2, valve + halves.div_ceil(2));
         let input = Input {
             command: if on { T::ONE } else { T::ZERO },
@@ -559,8 +559,8 @@ mod tests {
         assert!(switches <= 400 + 12, "{switches}");
     }
 
-    /// Changed in operation: the share of time with the valve open falls to the new budget, and invalid values change
-    /// nothing.
+    /// The air budget is changed in operation. The share of time with the valve open must fall to the new budget, and
+    /// invalid values must change nothing.
     #[test]
     fn the_air_budget_changes_in_operation() {
         let mut law = law::<f64>(0.8, 10);

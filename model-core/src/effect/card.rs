@@ -140,11 +140,11 @@ impl Parameter {
 /// Facts about records and model, for ranges and starting values.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Facts<'a> {
-    /// Size of y; 1 for signals of order 1, for which cards are written.
+    /// Typical size of y. The values on the cards hold for a size of 1.
     pub y: f64,
-    /// Size of u; 1 for on/off commands.
+    /// Typical size of u; 1 for on/off commands.
     pub u: f64,
-    /// Size of times; 1 for flows with time scales of 10 ms to seconds, for which cards are written.
+    /// Time scale relative to that of the cards: 1 for flows with times of 10 ms to seconds.
     pub time: f64,
     /// Root mean square change of y over a sample.
     pub y_per_sample: f64,
@@ -198,7 +198,8 @@ impl StartValue {
             _ => samples,
         };
         match self {
-            // A typical change of y is a better scale for it than the size of y.
+            // For a parameter in y per sample, a typical change of y is a better scale than the
+            // size of y.
             Self::Number(value) if parameter.unit == Unit::YPerSample => value * facts.y_per_sample,
             Self::Number(value) => value * parameter.unit.scale(facts.y, facts.time, facts.u),
             Self::Quantile(q) => facts.quantile(q),
@@ -338,7 +339,7 @@ pub struct LawCard {
 }
 
 impl LawCard {
-    /// A law that does not change the command; without its words.
+    /// The card of a law that does not change the command, with empty `words`.
     pub const PLAIN: Self = Self {
         words: "",
         shapes_command: false,
@@ -375,10 +376,10 @@ pub struct Spec {
     pub needs: Needs,
     /// Whether the effect is a base term, which is never reported as missing: a constant delay, the sensor's offset.
     pub base: bool,
-    /// Whether a second lag of the flow has the same output for every command: the two are then always stated
-    /// together.
+    /// Whether the effect and a second lag of the flow give the same output for every command. Reports then
+    /// always state both.
     pub lag_in_series: bool,
-    /// Whether it opposes or scales a motion: it is applied after all driving effects.
+    /// Whether the effect opposes or scales a motion; it is then applied after all driving effects.
     pub resists: bool,
     /// Whether the effect acts before all other effects of its place.
     pub leads: bool,
@@ -446,7 +447,7 @@ mod tests {
         assert_eq!(value(StartValue::Quantile(0.5), Unit::Y), 10.0);
         assert_eq!(value(StartValue::Delay(-6.0), Unit::Samples), 34.0);
         assert_eq!(value(StartValue::Delay(-6.0), Unit::Second), 0.068);
-        // Limited to one sample from below, and to the range from above.
+        // A starting value is at least one sample and at most the upper end of the range.
         assert_eq!(value(StartValue::Delay(-60.0), Unit::Second), 0.002);
         assert_eq!(value(StartValue::Delay(1e6), Unit::Second), 1.0);
         assert!((value(StartValue::TimeConstants(2.0), Unit::Samples) - 100.0).abs() < 1e-9);

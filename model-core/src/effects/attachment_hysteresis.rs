@@ -1,4 +1,5 @@
-//! Hysteresis of attachment: an attached flow stays attached at a friction at which it would not attach.
+//! Hysteresis of attachment: an attached flow stays attached at a friction at which a separated flow
+//! would not attach.
 
 use crate::effect::{
     Amplitude, Effect, Flow, Instant, Parameter, Physics, Place, Setting, Spec, StartValue, Starts,
@@ -99,7 +100,7 @@ mod tests {
     #[test]
     fn between_the_thresholds_the_flow_stays_what_it_was() {
         let relay: AttachmentHysteresis<f64> = prepared(&[0.6, 0.3, 0.2]);
-        // To 0.45 from below, then above the upper threshold, then back to 0.45.
+        // The level is raised to 0.45, then above the upper threshold, then lowered to 0.45.
         let s = flow(
             &relay,
             |k| if (600..1200).contains(&k) { 0.7 } else { 0.45 },

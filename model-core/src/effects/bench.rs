@@ -53,7 +53,8 @@ pub(super) fn readings<E: Effect<f64>>(
     (0..1000).map(shown).collect()
 }
 
-/// A first-order flow of 50 samples that rises to `level` from rest, with the effect, over two seconds.
+/// A first-order flow with a time constant of 50 samples that rises to `level` from rest, with the
+/// effect, over two seconds.
 pub(super) fn flow<E: Effect<f64>>(effect: &E, level: impl Fn(usize) -> f64) -> Vec<f64> {
     const RELAXATION: f64 = 0.02;
     let mut state = effect.start();

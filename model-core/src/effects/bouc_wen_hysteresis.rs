@@ -28,7 +28,7 @@ impl<T: Real> Effect<T> for BoucWenHysteresis<T> {
     #[inline(always)]
     fn drive(&self, z: &mut T, flow: &Flow<T>, _at: &Instant<'_, T>) -> T {
         let change = flow.now - flow.before;
-        // Implicit in z where the loop closes, so it is stable for any change.
+        // The term that closes the loop is implicit in z, so the step is stable for any change.
         let closing = self.beta * change.abs();
         let opening = self.gamma * change;
         *z = (*z + self.stiffness * change - opening * z.abs()) / (T::ONE + closing.abs());

@@ -55,7 +55,7 @@ impl<T: Real> Physics<T> for DispersedDelay<T> {
     }
 }
 
-/// Standard deviation of three equal lags in series, relative to one.
+/// Standard deviation of the delay of three equal lags in series, relative to that of one lag.
 const SQRT_3: f64 = 1.732_050_807_568_877_2;
 
 #[cfg(test)]
@@ -75,7 +75,7 @@ mod tests {
         assert!((moment(&|_| 1.0) - 1.0).abs() < 1e-9, "nothing is lost");
         let mean = moment(&|t| t);
         let deviation = moment(&|t| (t - mean) * (t - mean)).sqrt();
-        // A sampled lag is half a sample early, three of them one and a half.
+        // A sampled lag is half a sample early, three lags one and a half samples.
         assert!((mean - (0.030 * SQRT_3 - 0.0015)).abs() < 2e-4, "{mean}");
         assert!((deviation - 0.030).abs() < 2e-4, "{deviation}");
     }

@@ -75,7 +75,7 @@ mod tests {
         let j = jets(&echo, |k| if k < 10 { 0.0 } else { 1.0 });
         assert_eq!(j[10], 1.0);
         assert_eq!(j[39], 1.0);
-        // Half way between two samples.
+        // The echo arrives half way between two samples.
         assert!((j[40] - 0.875).abs() < 1e-9, "{}", j[40]);
         assert!((j[41] - 0.75).abs() < 1e-9 && (j[999] - 0.75).abs() < 1e-9);
     }

@@ -77,7 +77,7 @@ mod tests {
     fn it_trails_a_ramp_by_its_time_and_ends_where_the_signal_does() {
         let film: HotFilmLag<f64> = prepared(&[0.050]);
         let y = readings(&film, |k| k as f64 * 0.001, |_| 0.0);
-        // Exact: t − τ·(1 − exp(−t/τ)).
+        // The exact response to a ramp is t − τ·(1 − exp(−t/τ)).
         for k in [10_usize, 50, 999] {
             let t = k as f64 * 0.001;
             let expected = t - 0.05 * (1.0 - (-t / 0.05).exp());

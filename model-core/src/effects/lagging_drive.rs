@@ -28,7 +28,7 @@ impl<T: Real> Effect<T> for LaggingDrive<T> {
     }
     #[inline(always)]
     fn jet(&self, lagging: &mut T, jet: T, _at: &Instant<'_, T>) -> T {
-        // The mean over the sample, as an integrating flow receives it.
+        // An integrating flow receives the mean of the drive over the sample.
         let left = (jet - *lagging) * self.mean;
         *lagging = jet + (*lagging - jet) * self.kept;
         jet - (T::ONE + self.reversal) * left
@@ -75,10 +75,10 @@ mod tests {
         let j = jets(&wrong, |k| if k < 500 { 1.0 } else { 0.0 });
         assert!((j[0] + 0.5).abs() < 0.03, "{}", j[0]);
         assert!((j[499] - 1.0).abs() < 1e-6);
-        // Opposite sign at the falling edge.
+        // At the falling edge the inverse response has the opposite sign.
         assert!((j[500] - 1.5).abs() < 0.03, "{}", j[500]);
         assert!(j[999].abs() < 1e-6);
-        // ∫(j − 1) dt = −(1 + g)·τ.
+        // The exact area is ∫(j − 1) dt = −(1 + g)·τ.
         let area: f64 = j[..500].iter().map(|j| (j - 1.0) * 0.001).sum();
         assert!((area + 1.5 * 0.030).abs() < 1e-5, "{area}");
     }

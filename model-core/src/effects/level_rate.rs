@@ -85,7 +85,8 @@ mod tests {
         assert_eq!(crate::effects::spec(name).map(|spec| spec.name), Some(name));
     }
 
-    /// A latch that is always on raises the level of the flow, which is approached at the same rate.
+    /// A latch that is always on raises the level of the flow by 0.3. The flow must approach this
+    /// level as if the jet had raised it.
     #[test]
     fn it_is_the_rate_of_what_other_effects_drive_too() {
         let latch: AttachmentHysteresis<f64> = prepared(&[-0.5, -0.6, 0.3]);

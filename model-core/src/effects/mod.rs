@@ -202,7 +202,7 @@ delay_laws! {
     edge_dependent_delay::EdgeDependentDelay,
 }
 
-// Within a place, in physical order.
+// The order within a place is the physical order.
 catalogue! {
     valve_lag::ValveLag: ValveLag<T>,
     plenum_droop::PlenumDroop: PlenumDroop<T>,

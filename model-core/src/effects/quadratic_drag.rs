@@ -21,7 +21,7 @@ impl<T: Real> Effect<T> for QuadraticDrag<T> {
     }
     #[inline(always)]
     fn drive(&self, _state: &mut (), flow: &Flow<T>, _at: &Instant<'_, T>) -> T {
-        // Δ + d·Δ·|Δ| = Δ₀ solved for Δ.
+        // Solves Δ + d·Δ·|Δ| = Δ₀ for Δ.
         let free = flow.next - flow.now;
         let two = T::ONE + T::ONE;
         let root = (T::ONE + two * two * self.coefficient * free.abs()).sqrt();

@@ -25,7 +25,7 @@ impl<T: Real> Transport<T> for SaturatingDelay<T> {
     #[inline(always)]
     fn delay(&self, output: T) -> T {
         let x = (output / self.level).at_most(T::ONE);
-        // Rounding must not exceed the bounds.
+        // Rounding must not take the delay beyond its bounds.
         let share = ((T::ONE - x) * (T::ONE + self.bend * x)).at_most(T::ONE);
         self.floor + self.rise * share
     }

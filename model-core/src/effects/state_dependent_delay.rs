@@ -109,7 +109,7 @@ mod tests {
         assert_eq!(law.bounds(), Some([47.35, 47.35 + 12.69]));
         assert_eq!(law.delay(0.0), 47.35 + 12.69);
         assert!((law.delay(2.0) - 47.35).abs() < 1e-9);
-        // The fraction 1 − 1/e of the change at ỹ = 1/p2.
+        // At ỹ = 1/p2 the delay has completed the fraction 1 − 1/e of its change.
         let there = law.delay(1.0 / 20.18);
         assert!((there - (47.35 + 12.69 / core::f64::consts::E)).abs() < 1e-9);
         let runaway = StateDependentDelay { rate: -1.0, ..law };

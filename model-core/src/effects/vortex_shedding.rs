@@ -91,11 +91,12 @@ mod tests {
         let shedding: VortexShedding<f64> = prepared(&[frequency, damping, 0.3]);
         let y = readings(&shedding, |_| 0.5, |k| if k < 1 { 0.0 } else { 1.0 });
         let ringing = |k: usize| y[k] - 0.5;
-        // The edge itself: q is 0 while the jet is 1.
+        // At the edge itself q is 0 while the jet is 1.
         assert!((ringing(1) + 0.3).abs() < 1e-12);
         let damped = frequency * (1.0 - damping * damping).sqrt();
         let period = (1000.0 / damped).round() as usize;
-        // After a period the same phase, smaller by exp(−2πζ/√(1 − ζ²)).
+        // After one period the phase is the same and the amplitude is smaller by exp(−2πζ/√(1 −
+        // ζ²)).
         let left = (-core::f64::consts::TAU * damping * frequency / damped).exp();
         assert!((ringing(1 + period) / ringing(1) - left).abs() < 0.02);
         assert!(ringing(999).abs() < 1e-2 * 0.3);

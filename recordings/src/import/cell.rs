@@ -34,7 +34,8 @@ pub(super) struct Number<'a> {
 pub(super) enum Decimals {
     Point,
     Comma,
-    /// Undecided or mixed: a single mark is the decimal separator.
+    /// Undecided, or not the same in all cells: a mark that occurs only once in a number is its
+    /// decimal separator.
     Each,
 }
 
@@ -179,7 +180,8 @@ fn number(text: &str, decimals: Decimals) -> Option<Number<'_>> {
 /// Thousands marks other than points and commas.
 const GROUPS: [char; 5] = ['\'', '’', ' ', '\u{a0}', '\u{202f}'];
 
-/// The digits with their marks at the start of a cell, without the sign, and what follows.
+/// Splits a cell without its sign into its leading digits, with their marks, and the remaining
+/// text.
 fn mantissa(text: &str) -> Option<(&str, &str)> {
     let text = text.strip_prefix(['-', '+', '−']).unwrap_or(text);
     let mut end = 0;
@@ -203,7 +205,8 @@ fn mantissa(text: &str) -> Option<(&str, &str)> {
         .then_some((mantissa, rest))
 }
 
-/// Whether a mark stands before groups of three digits, after one to three that do not begin with 0.
+/// Whether `mark` separates groups of three digits, after a first group of one to three digits that
+/// does not begin with 0.
 fn is_grouped(digits: &str, mark: char) -> bool {
     let mut groups = digits.split(mark);
     let first = groups.next().unwrap_or_default();
@@ -251,7 +254,7 @@ fn ungrouped(mantissa: &str, decimals: Decimals) -> Option<(String, bool)> {
     Some((digits, true))
 }
 
-/// `e-3` at the start of what follows a mantissa, and the rest.
+/// Splits the text after a mantissa into the exponent (`e-3`) and the remaining text.
 fn exponent(rest: &str) -> (&str, &str) {
     let is_one = |text: &str| -> Option<usize> {
         let digits = text.strip_prefix(['e', 'E'])?;
@@ -305,7 +308,7 @@ pub(super) fn switch(text: &str) -> Option<bool> {
     known.map(|&(_, on)| on)
 }
 
-/// `u_inf [m/s]`, `u_inf (m/s)`, `u_inf in m/s` and `u_inf / m/s` in two.
+/// Splits `u_inf [m/s]`, `u_inf (m/s)`, `u_inf in m/s` and `u_inf / m/s` into name and unit.
 pub(super) fn name_and_unit(text: &str) -> (&str, Option<String>) {
     let bracketed = |open: char, close: char| {
         let (name, rest) = text.split_once(open)?;

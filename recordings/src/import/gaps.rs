@@ -19,7 +19,7 @@ pub(super) struct Gaps {
     pub(super) rows: Vec<usize>,
 }
 
-/// Values between those at the ends of a gap.
+/// How the missing values of a gap are filled.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Filling {
     /// Linear.
@@ -73,7 +73,8 @@ pub(super) fn completed(
 }
 
 impl Gaps {
-    /// `values` of the rows of the file, as values of the samples. Missing ones are NaN and are filled.
+    /// Converts `values` from one per row of the file to one per sample. Missing values are NaN and are
+    /// filled.
     ///
     /// # Errors
     /// [`DataError`] at a value that is infinite, or missing and not filled.

@@ -12,7 +12,7 @@ const HEAD: usize = 400;
 pub(super) struct Labels(pub(super) Vec<String>);
 
 impl Labels {
-    /// The labels of a text most of whose lines hold at least two labelled values each.
+    /// The labels of a text; `None` unless most of its lines contain at least two labelled values.
     pub(super) fn of(lines: &[&str]) -> Option<Self> {
         let mut most: Vec<(&str, &str)> = Vec::new();
         let (mut labelled, mut all) = (0, 0);
@@ -144,7 +144,7 @@ pub(super) fn leading<'a>(lines: &[&'a str]) -> Option<Vec<(&'a str, &'a str)>> 
     before_lines(lines, split)
 }
 
-/// Each line split in two, if most lines can be.
+/// Splits each line in two; `None` unless this is possible for most lines.
 fn before_lines<'a>(
     lines: &[&'a str],
     split: impl Fn(&&'a str) -> Option<(&'a str, &'a str)>,

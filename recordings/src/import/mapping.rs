@@ -20,7 +20,8 @@ use crate::record::{Origin, RESERVED, Record, Use};
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Mapping {
-    /// The time; `None`: found by its name, or the sampling period is given.
+    /// Name of the time. With `None` the time is found by its usual names, or the sampling period
+    /// is given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub t: Option<String>,
     /// Seconds per unit of the time; `None`: as stated in its header, otherwise 1.
@@ -35,7 +36,7 @@ pub struct Mapping {
     /// Longest gap that is filled, s, from the value before it to the value after it; `None`: no gap is filled.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fill_gaps_s: Option<f64>,
-    /// The command; `None`: found by its name.
+    /// Name of the command. With `None` it is found by its usual names.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub u: Option<String>,
     /// Factor of u: u = u_scale · variable + u_offset.
@@ -47,7 +48,7 @@ pub struct Mapping {
     /// u is 1 above this value of the scaled command and 0 elsewhere: makes a voltage an on/off command.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub u_threshold: Option<f64>,
-    /// The output; `None`: found by its name.
+    /// Name of the output. With `None` it is found by its usual names.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub y: Option<String>,
     /// Factor of y: y = y_scale · variable + y_offset.
@@ -56,7 +57,7 @@ pub struct Mapping {
     /// Offset of y. Standard errors and envelopes are scaled accordingly.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub y_offset: Option<f64>,
-    /// Further variables to keep; `None`: all that are as long as u.
+    /// Further variables to keep. With `None` all variables that are as long as u are kept.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub channels: Option<Vec<String>>,
 }

@@ -111,7 +111,7 @@ impl<'a> Elements<'a> {
         let short = || damaged("an element extends beyond the end of the file");
         let tag = word(self.bytes, 0, self.order).ok_or_else(short)?;
         let (kind, start, length) = if tag >> 16 != 0 {
-            // A small element: length, type and data within eight bytes.
+            // In a small element, length, type and data are within eight bytes.
             (tag & 0xffff, 4, (tag >> 16) as usize)
         } else {
             let length = word(self.bytes, 4, self.order).ok_or_else(short)?;

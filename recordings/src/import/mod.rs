@@ -59,7 +59,7 @@ pub struct Import {
     pub validate: Vec<String>,
     /// Splits each record at this time, s: the whole becomes a validation record whose lead is the earlier samples.
     pub hold_out_from_s: Option<f64>,
-    /// Command before the first sample of every record; `None`: its first value.
+    /// Command before the first sample of every record; `None`: the first value of u.
     pub u_before: Option<f64>,
     /// The input has levels between 0 and 1.
     pub graded: bool,

@@ -35,7 +35,7 @@ pub(super) fn archive(bytes: &[u8], budget: &mut Budget) -> Result<Source, DataE
         let what = || format!("`{}`", printable(&name));
         budget.take(size, what)?;
         let mut content = Vec::with_capacity(usize::try_from(size).unwrap_or(0));
-        // At most the stated size.
+        // Reads at most the stated size.
         file.take(size)
             .read_to_end(&mut content)
             .map_err(|_| broken())?;
@@ -108,7 +108,7 @@ fn array(
         let index = match shape.as_slice() {
             [rows, _] if fortran.starts_with("True") => column * rows + row,
             [_, columns] => row * columns + column,
-            // A vector in either orientation.
+            // The array is a vector, as a row or as a column.
             _ => row + column,
         };
         let bytes = data.get(index * size..(index + 1) * size);

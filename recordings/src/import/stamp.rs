@@ -12,7 +12,7 @@ const DAY: f64 = 86_400.0;
 enum Date {
     /// Days since 1970-01-01.
     Days(i64),
-    /// Two ambiguous numbers of day and month, and the year.
+    /// Two numbers that can be day and month in either order, and the year.
     Either(u8, u8, i32),
 }
 
@@ -185,7 +185,7 @@ fn date_of(text: &str) -> Option<Date> {
         return days(year(a)?, number(b, 2)?, number(c, 2)?);
     }
     let (first, second, year) = (number(a, 2)?, number(b, 2)?, year(c)?);
-    // With points the day is first.
+    // In a date with points the day is first.
     if text.contains('.') {
         return days(year, second, first);
     }
@@ -427,7 +427,8 @@ mod tests {
         assert_eq!(days_from_civil(2024, 9, 17), Some(19_983));
     }
 
-    /// The order with the shorter record applies: 5 and 6 June, not 6 May and 6 June. A 13 can only be a day.
+    /// Of the two orders of day and month, the one that gives the shorter record applies: 5 and 6 June, not 6
+    /// May and 6 June. A number of 13 can only be a day.
     #[test]
     fn the_order_of_day_and_month_is_that_of_the_shorter_record() {
         assert_eq!(

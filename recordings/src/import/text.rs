@@ -27,7 +27,7 @@ enum Layout {
     Labelled(Labels),
 }
 
-/// A line as a row.
+/// Result of reading a line as a row.
 enum Line {
     Row,
     /// Not a row; may occur between rows.
@@ -103,7 +103,7 @@ impl Layout {
 
 /// The columns of a table.
 pub(super) fn variables(bytes: &[u8], budget: &mut Budget) -> Result<Source, DataError> {
-    // Memory of the text and of its line index.
+    // Reserves memory for the text and for its line index.
     let lines = bytes.iter().filter(|b| **b == b'\n').count() as u64 + 1;
     budget.take(2 * bytes.len() as u64 + lines * LINE, || {
         "its text".to_owned()

@@ -130,7 +130,7 @@ impl Mapping {
         let clock = times.clock(stated).map_err(|f| {
             let row = rows.get(f.row).copied().unwrap_or(f.row);
             let problem = match f.problem {
-                // A gap that was not filled and is not a multiple of the period.
+                // The gap was not filled, and its length is not a multiple of the period.
                 DataProblem::TimeGap { step, period, .. } if self.fill_gaps_s.is_some() => {
                     DataProblem::TimeUneven { step, period }
                 }
@@ -208,7 +208,7 @@ impl Mapping {
         if let Some(scale) = seconds_by_name(&time.name) {
             return Ok(known(scale));
         }
-        // From September 2001 to November 2286.
+        // The ranges correspond to times from September 2001 to November 2286.
         let first = time.values.first().copied().unwrap_or(0.0) / SINCE_1970;
         let epochs = [("s", 1.0), ("ms", 1e-3), ("µs", 1e-6), ("ns", 1e-9)];
         let is_one = |(_, seconds): &(&str, f64)| (1.0..10.0).contains(&(first * seconds));
@@ -226,7 +226,8 @@ fn counted_from(first: &str) -> String {
     format!("time is counted from the first row ({first})")
 }
 
-/// A clock with the dates of the file, or dates with the clock.
+/// Clock times together with the only column of dates in the file, or dates together with the only
+/// column of clock times.
 fn with_date<'a>(
     source: &'a Source,
     time: &'a Variable,
@@ -278,7 +279,7 @@ fn scaled(t: &Variable, start: f64, scale: f64) -> PrintedTimes {
             let units = units.iter().zip(&t.values);
             units.map(|(unit, v)| unit.max(bits(v)) * scale).collect()
         }
-        // An accumulated clock has larger errors than the last bit.
+        // Times that are accumulated step by step have errors larger than the last bit.
         Exactness::Relative(share) => {
             let values = t.values.iter();
             values.map(|v| 8.0 * share * (v * scale).abs()).collect()

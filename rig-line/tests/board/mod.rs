@@ -131,7 +131,8 @@ fn run(hands: &Hands, mut line: UnixStream) {
                     channels: &model::REFERENCES,
                 };
                 let y = step(&flow, &mut state, &input).measured;
-                // In the units of `shown`: 800 counts are y = 0, 2000 more y = 1.
+                // The friction for which `shown` gives the board's counts: 800 counts for y = 0,
+                // and 2000 more for y = 1.
                 shown(
                     k,
                     (on_board::SETTINGS.calibration.counts(y) - 900.0) / 1800.0,
@@ -166,7 +167,7 @@ fn run(hands: &Hands, mut line: UnixStream) {
                 }
                 Err(_) => {}
             }
-            // 11.52 bytes in a sample; a host that does not read takes none.
+            // The line transmits 11.52 bytes in a sample. A host that does not read takes none.
             tenths = (tenths + 115).min(230);
             let mut out = Vec::new();
             while tenths >= 10 {
@@ -179,8 +180,8 @@ fn run(hands: &Hands, mut line: UnixStream) {
     }
 }
 
-/// The board's end of the line. A host that waits for a processor has not stopped reading: the line waits for it,
-/// because a real line would not overflow then.
+/// The board's end of the line. A host that waits for a processor has not stopped reading. The line waits for
+/// such a host, because a real line would not overflow in this time.
 #[derive(Default)]
 struct Told {
     /// Whether the host has stopped reading. Determined once, so that the board's time continues.

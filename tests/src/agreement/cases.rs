@@ -130,7 +130,7 @@ pub fn cases(gradings: Gradings) -> Vec<Case> {
         model.add(definition.spec(), &middle(definition.spec()), reference);
         add(format!("own: {}", definition.spec().name), model);
     }
-    // Every function, comparison and kind of memory in the language of effects.
+    // The effect has every function, comparison and kind of memory of the language of effects.
     let all = Definition::from_toml(ALL, "all.toml").expect("an effect");
     let mut model = base();
     model.define(all).expect("no other");

@@ -88,8 +88,8 @@ impl Vectors {
         y
     }
 
-    /// The law's decisions, estimates and readings: its own estimate with disturbances, or the given
-    /// readings.
+    /// The decisions, estimates and readings of the law. The readings are the law's own estimate
+    /// with disturbances, or the given readings.
     #[must_use]
     pub fn law<T: Real>(&self, model: &Model) -> (Vec<bool>, Vec<f64>, Vec<f64>) {
         match &model.law {

@@ -13,7 +13,7 @@ struct Arguments {
     /// Fail if a language's tool is not installed.
     #[arg(long)]
     all: bool,
-    /// Times a million samples of the bundled models in each language instead.
+    /// Instead of the comparison, times a million samples of the bundled models in each language.
     #[arg(long)]
     pace: bool,
     /// Tries each effect with graded commands of one kind, not of every kind.

@@ -326,7 +326,7 @@ impl Bench {
 /// Noise of a sensor at rest over two seconds, averaged over 64 samples, as in `record --calibrate`.
 fn slow_noise(seed: u64) -> f64 {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    // Independent of the noise of the runs.
+    // This noise is independent of the noise of the runs.
     rng.set_stream(9);
     let mut noise = NoiseSignal::new(Noise::HOT_FILM, rng);
     let means: Vec<f64> = (0..31)

@@ -20,8 +20,8 @@ struct Arguments {
     /// Seed of the first rig.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Identify with two lags each and without a diagnosis: a tenth of the time, but fewer models at the
-    /// noise level.
+    /// Identify with two lags each and without a diagnosis. This takes a tenth of the time, but fewer
+    /// models reach the noise level.
     #[arg(long)]
     quick: bool,
     /// File of the results.

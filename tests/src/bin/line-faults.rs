@@ -122,7 +122,7 @@ fn period_s(bench: &mut Bench) -> Result<f64> {
 fn shut(bench: &mut Bench) -> Result<()> {
     let until = Instant::now() + Duration::from_secs(120);
     let mut seen = None;
-    // Closed, and still closed 50 samples later.
+    // The valve must be closed, and still closed 50 samples later.
     while Instant::now() < until {
         let samples = bench.emulator.samples();
         match (bench.emulator.is_open(), seen) {
@@ -151,7 +151,7 @@ fn garbage(mut bench: Bench) -> Result<String> {
                 .collect();
             sent += noise.len();
             host.port().send(&noise)?;
-            // Half of a request without the other half.
+            // Half of a request is sent without the other half.
             host.port().send(&[0, 40, 0x26, 1])?;
         }
         Ok(())

@@ -122,7 +122,8 @@ impl Entry for Row {
 }
 
 impl Row {
-    /// The names that count: without those that are true of the rig although not hidden on purpose.
+    /// The names that count. Names that are true of the rig, although not hidden on purpose, are
+    /// left out.
     #[must_use]
     pub fn named(&self) -> Vec<&str> {
         let has = |names: &[String], name: &str| names.iter().any(|other| other == name);
@@ -180,13 +181,13 @@ impl Row {
         names
     }
 
-    /// Found, without a wrong name.
+    /// Whether the hidden effect was found, without a wrong name.
     #[must_use]
     pub fn is_right(&self) -> bool {
         self.is_found() && self.needless().is_empty()
     }
 
-    /// Found, or in the equivalence set of a name.
+    /// Whether the hidden effect was found, or is in the equivalence set of a named effect.
     #[must_use]
     pub fn is_in_set(&self) -> bool {
         let mut sets = self.sets.iter().flatten();

@@ -113,7 +113,7 @@ fn asked(
 ) -> Result<(Value, Spent, Spent), String> {
     let inside = |name: &str| folder.join(name).to_string_lossy().into_owned();
     let (data, given, found) = (inside("set"), inside("given.toml"), inside(FOUND));
-    // Left over from an earlier run.
+    // These files may be left over from an earlier run.
     let _ = fs::remove_dir_all(folder.join("set"));
     let _ = fs::remove_file(&found);
     fs::create_dir_all(folder).map_err(|e| e.to_string())?;

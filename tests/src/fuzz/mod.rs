@@ -160,7 +160,7 @@ fn watch(name: &'static str, now: std::sync::Weak<Mutex<(Instant, Vec<u8>)>>) {
 mod tests {
     use super::*;
 
-    /// Stored failures, and the seeds.
+    /// Tests all seeds and all stored inputs, such as those of earlier failures.
     #[test]
     fn every_input_that_was_kept_is_withstood() {
         for target in TARGETS {

@@ -418,8 +418,8 @@ fn frames() -> Vec<Vec<u8>> {
     seeds
 }
 
-/// Bytes from the line to either end, and the same bytes as the content of a valid frame, because the checksum
-/// would reject them otherwise.
+/// Passes bytes from the line to either end, and passes the same bytes as the content of a valid frame,
+/// because the checksum would reject them otherwise.
 fn framed(input: &[u8]) -> String {
     let mut receiver = Receiver::new();
     let mut said = (0, 0, "");
@@ -443,7 +443,7 @@ fn framed(input: &[u8]) -> String {
             came.push(content.to_vec());
         }
     }
-    // Content that does not fit into a frame gives none.
+    // Content that is too long for a frame gives no frame.
     assert!(
         came.iter().all(|came| content.starts_with(came)),
         "a frame came changed"

@@ -151,7 +151,8 @@ pub fn run(options: &Options, tell: impl Fn(&Broken) + Sync) -> std::io::Result<
     Ok(outcome)
 }
 
-/// The changes of one rig that made a difference, and whether that is a near tie.
+/// The changes of one rig that made a difference, and for each whether the difference is a near
+/// tie.
 fn rig(
     seed: u64,
     strangers: &[records::Base],
@@ -173,7 +174,8 @@ fn rig(
     let before = ask(&base.parts, &folders[0]);
     let mut found = Vec::new();
     for change in Change::ALL {
-        // Drawn for every change, so that each is the same with and without the others.
+        // The random numbers are drawn for every change, so that a change is the same with and
+        // without the others.
         let (changed, factor, words) = change.applied(&base, &mut random);
         if !options.tries(change) {
             continue;

@@ -22,7 +22,7 @@ pub(super) struct Said {
     delays: Vec<f64>,
     fit_percent: f64,
     rmse: f64,
-    /// 1 − the larger of the poles, open and closed.
+    /// 1 minus the larger of the largest pole magnitudes with the valve open and closed.
     decay: f64,
     /// Mean of the measured edges, samples.
     edges: Option<f64>,
@@ -137,7 +137,7 @@ fn finding(answer: &Answer) -> String {
 }
 
 fn write(records: &[Part], folder: &Path) -> Result<(), String> {
-    // The folder of the preceding case.
+    // The folder may contain the preceding case.
     let _ = std::fs::remove_dir_all(folder);
     let records = records.iter().map(|part| {
         let role = if part.held_out {
@@ -178,7 +178,7 @@ pub(super) fn broken(change: Change, factor: f64, before: &Said, after: &Said) -
     let mut found = Differences::default();
     if before.failed.is_some() || after.failed.is_some() {
         let words = |said: &Said| said.failed.clone().unwrap_or_else(|| "done".to_owned());
-        // A failure of both is not a difference between them, but not an answer either.
+        // If both fail, there is no difference between them, but no answer either.
         found.of_answer = vec![format!("{} → {}", words(before), words(after))];
         return found;
     }

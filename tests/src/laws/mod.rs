@@ -2,8 +2,8 @@
 //!
 //! The plants are those of `firmware-sim`, which simulate physics in continuous time and share no code with the
 //! model. A rig is recorded, identified and diagnosed like by a user. The law is designed for targets drawn over
-//! the reachable interval and tried on the plants that the records do not exclude. Then it runs on the rig itself,
-//! and the ends of the margin are checked there.
+//! the reachable interval and tried on the plants that the records do not exclude. Then the law runs on the rig
+//! itself, and the ends of the margin are checked there.
 
 use anyhow::Context;
 use closed_loop::{Controlled, Figures, OpenLoop, Trace, run, span};

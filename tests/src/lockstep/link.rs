@@ -51,7 +51,7 @@ impl Link {
     /// # Errors
     /// The device cannot be opened.
     pub fn serial(device: &str, lose: usize) -> Result<Self> {
-        // 115 200 baud, raw: as the boards set their UART up.
+        // The line has 115 200 baud and is raw, as the boards set up their UART.
         let set = Command::new("stty")
             .args(["-F", device, "115200", "raw", "-echo"])
             .status()
@@ -127,7 +127,7 @@ impl Link {
                 match reply.split_first_chunk::<3>() {
                     Some(([DAMAGED, ..], _)) => break,
                     Some((head, rest)) if *head == [kind, low, high] => return Ok(rest.to_vec()),
-                    // A reply to an earlier attempt.
+                    // This is a reply to an earlier attempt.
                     _ => {}
                 }
             }

@@ -59,7 +59,8 @@ pub fn run_case(link: &mut Link, number: u8, case: &Case) -> Result<Measured> {
     let (mut switches, mut friction, mut open, mut done) = (0, 0.0, false, 0);
     while done < case.steps {
         let batch = BATCH.min(case.steps - done);
-        // The reading during the batch: jets that arrive in it were issued before.
+        // The readings during the batch. All jets that arrive during the batch were issued before
+        // it.
         let mut ahead = plant.clone();
         let mut readings = Vec::with_capacity(batch);
         let channel = channel(done);

@@ -162,7 +162,7 @@ fn of_data(right: &Right, heard: &Heard) -> Vec<String> {
     if let Some([low, high]) = right.u {
         let [least, most] = range(|r| &r.u);
         let near = 0.01 * (high - low);
-        // A command that does not reach full strength is valid if it lies inside.
+        // A command that does not reach full strength is valid if its values lie inside the range.
         if least < low - near || most > high + near || most <= least {
             wrong.push(format!("u from {least} to {most}"));
         }

@@ -22,7 +22,7 @@ fn the_workbench_finds_what_is_missing_and_loses_nothing() {
     steps.done("the set is on the page");
     page.accessible();
     page.shoot("workbench-start.png");
-    // A pane is made wider by its border.
+    // The border of a pane can be moved to make the pane wider.
     let wider = "(() => { const pane = document.getElementById('left'), before = pane.offsetWidth; document.querySelector('[data-pane=left]').dispatchEvent(new KeyboardEvent('keydown', {key: 'ArrowRight'})); const by = pane.offsetWidth - before; document.querySelector('[data-pane=left]').dispatchEvent(new KeyboardEvent('keydown', {key: 'ArrowLeft'})); return by; })()";
     assert_eq!(page.act(wider), 20);
 
@@ -115,7 +115,7 @@ fn the_workbench_finds_what_is_missing_and_loses_nothing() {
     let address = page.act("location.href");
     let again = b.open(address.as_str().expect("an address"), SIZE);
     again.until(20, "[...document.querySelectorAll('.switches label')].some(l => l.textContent.startsWith('3. '))");
-    // Another branch, from the earlier model.
+    // Another branch starts from the earlier model.
     page.click("[aria-label=\"add stopping-vortex\"]");
     page.idles_with(900, 4);
     page.has(20, ".tree .tree > li", 2);

@@ -152,7 +152,8 @@ fn an_own_effect_is_mended_under_the_cursor_and_a_law_designed() {
             "(() => {{ const a = document.getElementById('own-text'); a.value = {text}; a.dispatchEvent(new Event('input')); a.scrollIntoView(); }})()"
         )
     };
-    // The error is shown during typing, with a mark below it; Keep puts the cursor there.
+    // The error is shown during typing, with a mark below it; the button Keep puts the cursor at
+    // the error.
     page.act(&write(DROOP));
     page.says(5, "#own-told", "line 4, column 36");
     page.click("#own-keep");
@@ -169,7 +170,8 @@ fn an_own_effect_is_mended_under_the_cursor_and_a_law_designed() {
     page.until(10, "document.querySelector('.model.current').textContent === '2. + supply-sag' && document.getElementById('log').textContent.includes('--effect-file=')");
     steps.done("added");
 
-    // A law: an unreachable goal is refused with a message, a reachable one is tried in the loop.
+    // An unreachable goal of a law is refused with a message; a reachable goal is tried in the
+    // loop.
     let design = |target: f64| {
         format!(
             "(() => {{ const f = document.getElementById('design'); f.elements.target.value = {target}; f.requestSubmit(); }})()"

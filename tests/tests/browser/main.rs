@@ -74,11 +74,12 @@ fn picture(name: &str) -> PathBuf {
     folder.join(name)
 }
 
-/// The workbench, serving; ends with this value, as abruptly as a power cut.
+/// A running workbench. When this value is dropped, the workbench ends as abruptly as in a power
+/// cut.
 struct Served {
     child: Child,
     address: String,
-    /// From the start to the address, s.
+    /// Time from the start of the program to the line with its address, s.
     ready_s: f64,
 }
 

@@ -16,7 +16,7 @@ const DIFFERENCE: f64 = 8.0;
 /// The browser reduces a picture, so no PNG decoder is needed here. `small` returns 64 × 64 greys row by row.
 const SMALL: &str = "async (address) => { const i = new Image(); i.src = address; await i.decode(); const c = new OffscreenCanvas(i.width, i.height), x = c.getContext('2d'); x.drawImage(i, 0, 0); const d = x.getImageData(0, 0, i.width, i.height).data, n = 64, sum = new Array(n * n).fill(0), count = new Array(n * n).fill(0); for (let r = 0; r < i.height; r++) for (let k = 0; k < i.width; k++) { const cell = Math.floor(r * n / i.height) * n + Math.floor(k * n / i.width), p = 4 * (r * i.width + k); sum[cell] += 0.299 * d[p] + 0.587 * d[p + 1] + 0.114 * d[p + 2]; count[cell] += 1; } return sum.map((s, k) => Math.round(s / count[k])); }";
 
-/// A PNG of 64 × 64 greys, base64.
+/// Script that encodes 64 × 64 grey values as a PNG in base64.
 const PNG: &str = "async (greys) => { const c = new OffscreenCanvas(64, 64), x = c.getContext('2d'), d = x.createImageData(64, 64); greys.forEach((g, k) => d.data.set([g, g, g, 255], 4 * k)); x.putImageData(d, 0, 0); const b = new Uint8Array(await (await c.convertToBlob()).arrayBuffer()); return btoa(String.fromCharCode(...b)); }";
 
 impl Tab<'_> {
@@ -52,7 +52,7 @@ impl Tab<'_> {
     }
 }
 
-/// A picture, PNG, as 64 × 64 greys.
+/// The grey values of a PNG picture that is reduced to 64 × 64 pixels.
 fn greys(desk: &Tab<'_>, png: &[u8]) -> Vec<f64> {
     let address = format!("data:image/png;base64,{}", STANDARD.encode(png));
     let told = desk.act(&format!("({SMALL})('{address}')"));

@@ -34,7 +34,7 @@ fn segments(pdf: &[u8]) -> usize {
 /// Prints a page of `records` records, and checks that nothing is lost.
 #[track_caller]
 pub(crate) fn keeps_its_curves(b: &Window, address: &str, records: usize) {
-    // Printed from a dark screen: the paper is white nevertheless.
+    // The page is printed from a dark screen, but the paper is white.
     let page = b.open_dark(address, SIZE);
     page.until(
         20,
@@ -49,7 +49,7 @@ pub(crate) fn keeps_its_curves(b: &Window, address: &str, records: usize) {
     page.act("(() => { hostFit.groups[0].paper = () => {}; return true; })()");
     let without = segments(&page.pdf());
     eprintln!("  printed: {with} line segments, {without} without the records");
-    // Records with measurement, model and residual, some hundred segments each.
+    // Each record has measurement, model and residual, with some hundred segments each.
     assert!(with > without + records * 3 * 200, "{with} and {without}");
     // Printing does not change the screen.
     page.has(5, ".paper", 0);

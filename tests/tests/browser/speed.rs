@@ -86,7 +86,7 @@ fn long_records_open_and_pan_smoothly() {
     eprintln!("  8 × 10 000 × 3");
     assert!(page.panned() < SLOWEST_FRAME);
 
-    // Within 2 s on an idle machine.
+    // On an idle machine the page opens within 2 s.
     assert!(opened < 10.0, "600 000 samples took {opened} s");
     b.has_no_faults();
 }

@@ -61,12 +61,12 @@ fn set(folder: &Path, samples: usize, records: &[Asked], jet: fn(&mut f64, f64, 
     std::fs::write(folder.join("dataset.toml"), manifest).expect("a manifest");
 }
 
-/// Irregular switches, as a telegraph's.
+/// A random number of samples until the next switch, 40 to 400.
 fn telegraph(chance: &mut Chance) -> usize {
     40 + (360.0 * chance.even()) as usize
 }
 
-/// The leanest model, in no time.
+/// Script that requests a small model with a short search.
 const LEAN: &str = "(() => { const f = document.getElementById('identify').elements; f.delay.value = 'fixed'; f.n1.value = 1; f.n2.value = 1; f['max-lag'].value = 60; f.evaluations.value = 300; f.n1.form.requestSubmit(); })()";
 
 #[test]
@@ -126,7 +126,8 @@ fn a_term_that_no_catalogue_has_is_found_and_taken_as_a_formula() {
 fn the_experiment_that_tells_is_drawn_and_saved() {
     let folder = tempfile::tempdir().expect("a folder");
     let data = folder.path().join("saturation");
-    // A pull that grows with the cube of y, or with its duration: slow square waves do not distinguish the two.
+    // A pull that grows with the cube of y is not distinguishable from a pull that grows with its duration if
+    // all square waves are slow.
     let records: &[Asked] = &[
         ("a", "identify", |_| 250),
         ("b", "identify", |_| 150),

@@ -137,7 +137,7 @@ fn other_names_and_other_sites_are_kept_out() {
         };
         status(&app, empty(builder.header(name, value)))
     };
-    // A name that was rebound to this machine.
+    // An attacker could have made such a name refer to this machine (DNS rebinding).
     for host in [
         "evil.example:4321",
         "127.0.0.1",
@@ -302,9 +302,9 @@ proptest! {
             Ok(value) if name != "host" => builder.header(&name, value),
             _ => builder,
         };
-        // A text that is not an address never reaches the server.
+        // A text that is not a valid address never reaches the server.
         let Ok(request) = builder.body(Body::from(body.clone())) else { return Ok(()) };
-        // These two are the dummy's panics.
+        // Input that makes the dummy panic on purpose is left out.
         prop_assume!(!String::from_utf8_lossy(&body).contains("\"model\":2"));
         let status = status(&app, request);
         prop_assert!(!status.is_server_error(), "{} {}", method, path);

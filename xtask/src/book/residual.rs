@@ -103,7 +103,8 @@ fn table(command: &[f64], base: Base) -> String {
     for (k, u) in command.iter().enumerate() {
         let _ = write!(text, "{}.{:03},{u}", k / 1000, k % 1000);
         if wind {
-            // A triangle wave of 1 s. The last digit of a library's sine could differ between machines.
+            // The free stream is a triangle wave with a period of 1 s, because the last digit of a
+            // library's sine could differ between machines.
             let phase = (k % 1000) as f64 / 1000.0;
             let triangle = 4.0 * (phase - 0.5).abs() - 1.0;
             let _ = write!(text, ",{}", 10.0 * (1.0 + 0.08 * triangle));

@@ -42,7 +42,7 @@ pub(super) fn run(steps: &[&'static Step]) -> Result<Vec<Done>> {
     std::fs::create_dir_all(&folder)?;
     // A step may rebuild this program.
     let program = folder.join("xtask");
-    // A copy of a stopped run may still be running.
+    // The copy of a stopped run may still be running, so it is removed before the new copy.
     let _ = std::fs::remove_file(&program);
     std::fs::copy(std::env::current_exe()?, &program).context("could not copy this program")?;
     let (progress, changed) = (Mutex::new(Progress::default()), Condvar::new());
@@ -79,7 +79,7 @@ fn lock(progress: &Mutex<Progress>) -> MutexGuard<'_, Progress> {
     progress.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// The next step that can start, or a step that cannot, with the failed one that it needs.
+/// The next step that can start; or a step that cannot run, with the failed step that it needs.
 fn next(
     steps: &[&'static Step],
     progress: &Mutex<Progress>,

@@ -18,7 +18,7 @@ pub(crate) const TASK: Task = Task {
 #[derive(Clone, Copy)]
 struct Step {
     name: &'static str,
-    /// Steps that must end before it starts; if one of them fails it is not run.
+    /// Steps that must end before this step starts. If one of them fails, this step is not run.
     after: &'static [&'static str],
     /// A resource that no two steps use at the same time.
     room: Option<Room>,
@@ -70,10 +70,10 @@ const STEPS: &[Step] = &[
         run(&mut firmware_cargo("fmt --all --check"))
     }),
     Step::new(SET_UP, || crate::setup::setup(&[])),
-    // The README's test command, including documentation examples. Everything is compiled before, so that the
-    // folder is locked only briefly.
+    // This is the README's test command, which includes documentation examples. Everything is compiled
+    // before, so that the folder is locked only briefly.
     Step::new("tests", || run(&mut cargo("test --release --workspace"))).after(&[BUILD]),
-    // The bundle in reports equals the sources.
+    // Checks that the script in the report pages was built from the present sources.
     Step::new("pages", || crate::pages::pages(&["--check".to_owned()])).after(&[SET_UP]),
     Step::new("browser", || crate::browser::browser(&[])).after(&[BUILD, "pages"]),
     Step::new("lints", || {
@@ -86,16 +86,16 @@ const STEPS: &[Step] = &[
         run(cargo("doc --release --workspace --no-deps").env("RUSTDOCFLAGS", "-Dwarnings"))
     })
     .within(Room::Host),
-    // The emulated board, one step after the other: the longest chain, so it starts before steps that can run at the
-    // same time.
+    // These steps use the emulated board one after the other. They are the longest chain, so they start before steps
+    // that can run at the same time.
     Step::new("faults", || crate::faults::faults(&[]))
         .after(&[SET_UP, BUILD])
         .within(Room::Firmware),
-    // Links only without panics; runs the constants; checks the budgets.
+    // The program links only without panics. The step runs the constants and checks the budgets.
     Step::new("pil", crate::budgets::check)
         .after(&[SET_UP, BUILD])
         .within(Room::Firmware),
-    // Lockstep at other periods, and the emulated board at one of them.
+    // Lockstep runs at other periods, and the emulated board at one of them.
     Step::new("periods", || crate::periods::periods(&[]))
         .after(&[SET_UP, BUILD])
         .within(Room::Firmware),
@@ -111,13 +111,13 @@ const STEPS: &[Step] = &[
         .within(Room::Firmware),
     Step::new("msrv", crate::msrv::msrv),
     Step::new("supply", crate::supply::supply),
-    // Every crate can be published.
+    // Checks that every crate can be published.
     Step::new("package", || (crate::package::TASK.run)(&[]))
         .after(&[BUILD])
         .within(Room::Host),
-    // Archive and wheel for people without a compiler, installed in another folder.
+    // Archive and wheel, for people without a compiler, are installed in another folder.
     Step::new("release", || crate::release::release(&[])).after(&[SET_UP, BUILD]),
-    // An effect and a delay law need one file and one line each.
+    // Checks that a new effect and a new delay law need only one file and one line each.
     Step::new("new effect", crate::new_effect::proof)
         .after(&[BUILD])
         .within(Room::Host),
@@ -125,7 +125,8 @@ const STEPS: &[Step] = &[
     Step::new("fuzz", crate::fuzz::brief).after(&[BUILD]),
     // The generated pages equal the catalogue, and every link has a target.
     Step::new("book", || crate::book::book(&["--check".to_owned()])).after(&[BUILD]),
-    // With the test profile; otherwise every dependency would be checked once for tests and once for the rest.
+    // The lints use the test profile; otherwise every dependency would be checked once for tests and once for
+    // the rest.
     Step::new("firmware lints", || {
         run(&mut firmware_cargo(
             "clippy --release --all-targets --package=firmware --package=identified \
@@ -140,7 +141,7 @@ const STEPS: &[Step] = &[
     Step::new("board lints", board_lints)
         .after(&[SET_UP])
         .within(Room::Firmware),
-    // The loop and the model without board code, also for smaller and newer cores.
+    // The loop and the model are built without board code, also for smaller and newer cores.
     Step::new("no_std", || {
         TARGETS
             .iter()

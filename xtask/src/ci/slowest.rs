@@ -27,7 +27,7 @@ pub(super) fn lines(output: &str) -> Vec<String> {
     let rows = programs.iter().take(LISTED);
     let rows = rows.map(|(seconds, name)| format!("  {seconds:7.1} s  {name}"));
     let title = (!programs.is_empty()).then(|| "\nlongest test programs".to_owned());
-    // One test at a time, with its name on the same line.
+    // The tests run one at a time, with the name on the same line.
     let skipped = output
         .lines()
         .filter_map(|line| Some(&line[line.find("skipped: ")?..]));

@@ -1,5 +1,6 @@
-//! Test that an effect of each place and a delay law can be added with one file and one line: a copy of the
-//! tree is built, lists them, tries them in a diagnosis, fits the law and generates constants from it.
+//! Test that an effect of each place and a delay law can be added with one file and one line. They are
+//! added to a copy of the tree, which is built. The program then has to list them, try them in a diagnosis,
+//! fit the law and generate constants from it.
 
 use super::{MODEL, write};
 use crate::shell::{cargo, output, root, run, target};

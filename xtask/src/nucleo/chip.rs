@@ -57,7 +57,7 @@ pub(super) struct Written {
     pub(super) value: u32,
 }
 
-/// The registers, the writes to them, and errors in these.
+/// The registers, the writes to them, and errors in these writes.
 pub(super) struct Chip {
     values: BTreeMap<u32, u32>,
     pub(super) written: Vec<Written>,
@@ -117,7 +117,7 @@ impl Chip {
     pub(super) fn value(&self, address: u32) -> u32 {
         let stored = self.values.get(&address).copied().unwrap_or(0);
         match address {
-            // Enabled clocks are ready immediately.
+            // Clocks are ready as soon as they are enabled.
             RCC_CR => {
                 stored & !(1 << 17 | 1 << 25) | (stored >> 16 & 1) << 17 | (stored >> 24 & 1) << 25
             }
@@ -188,7 +188,7 @@ impl Chip {
     /// is not set up.
     pub(super) fn convert(&mut self, counts: [u16; 2]) -> bool {
         let timer = self.value(TIM2) & 1 == 1;
-        // Triggered by TIM2's update, and enabled (RM0390, 13.13.3).
+        // The conversion must be enabled and triggered by TIM2's update (RM0390, 13.13.3).
         let triggered =
             self.value(ADC1 + 0x08) & (3 << 28 | 0xF << 24 | 1) == 1 << 28 | 6 << 24 | 1;
         if !timer || !triggered {

@@ -47,13 +47,13 @@ pub(super) fn field(value: u32, low: u32, bits: u32) -> u32 {
     value >> low & ((1 << bits) - 1)
 }
 
-/// Core and APB2, APB1, Hz.
+/// Clock frequencies of the core with APB2, and of APB1, Hz.
 fn clocks(chip: &Chip) -> [f64; 2] {
     let (pll, buses) = (chip.value(RCC_PLLCFGR), chip.value(RCC_CFGR));
     let [m, n] = [field(pll, 0, 6), field(pll, 6, 9)].map(f64::from);
     let p = f64::from(2 * (field(pll, 16, 2) + 1));
     let core = CRYSTAL / m * n / p;
-    // 0xx: not divided; 100 to 111: by 2 to 16.
+    // Codes 0xx: the clock is not divided; codes 100 to 111: it is divided by 2 to 16.
     let divisor = |code: u32| {
         if code < 4 {
             1.0
@@ -94,7 +94,7 @@ fn clock_tree(chip: &Chip) -> Result<String> {
         [fast, slow] == [84e6, 42e6],
         "core and APB2 at {fast} Hz, APB1 at {slow} Hz"
     );
-    // RM0390, table 5: 2.7 to 3.6 V, above 60 up to 90 MHz.
+    // RM0390, table 5, for 2.7 to 3.6 V: two wait states above 60 and up to 90 MHz.
     let waits = field(chip.value(FLASH), 0, 4);
     ensure!(waits == 2, "{waits} wait states");
     Ok(format!(
@@ -185,7 +185,7 @@ fn converter(chip: &Chip) -> Result<String> {
         field(chip.value(ADC1 + 0x2C), 20, 4) == 0 && field(chip.value(ADC1 + 0x34), 0, 5) == 0,
         "not channel 0 alone"
     );
-    // JL = 0: the single conversion is that of JSQ4.
+    // With JL = 0 there is one injected conversion, that of JSQ4.
     ensure!(
         field(chip.value(ADC1 + 0x38), 20, 2) == 0 && field(chip.value(ADC1 + 0x38), 15, 5) == 1,
         "not channel 1 after it"
@@ -250,7 +250,8 @@ fn valve(chip: &Chip) -> Result<String> {
 fn serial(chip: &Chip) -> Result<String> {
     let [_, apb1] = clocks(chip);
     let [rate, cr1, cr2, cr3] = [0x08, 0x0C, 0x10, 0x14].map(|offset| chip.value(USART2 + offset));
-    // Sixteen samples per bit, the divisor in sixteenths: together the clock cycles of a bit.
+    // A bit has sixteen samples, and the divisor is in sixteenths, so the register holds the clock
+    // cycles of a bit.
     ensure!(cr1 >> 15 & 1 == 0, "eight samples a bit");
     let baud = apb1 / f64::from(rate);
     ensure!((baud / 115_200.0 - 1.0).abs() < 0.01, "{baud} baud");

@@ -180,7 +180,7 @@ impl Board {
         for word in Chip::words() {
             self.debugger.watch(word)?;
         }
-        // LD2's pin is the last to be set up; before it the self-test runs.
+        // The pin of LD2 is the last to be set up; the self-test runs before it.
         while field(self.chip.value(chip::GPIOA), 10, 2) != 1 {
             let access = self.run(PATIENCE)?;
             ensure!(access.is_some(), "the program does not reach its loop");

@@ -16,7 +16,7 @@ pub(super) struct Access {
 pub(super) fn access(code: [u8; 4]) -> Option<Access> {
     let [a, b, c, d] = code;
     let (first, second) = (u16::from_le_bytes([a, b]), u16::from_le_bytes([c, d]));
-    // Beginning of a long instruction (ARMv7-M, A5.1).
+    // These are the first bits of a 32-bit instruction (ARMv7-M, A5.1).
     if first >> 11 >= 0b11101 {
         long(first, second)
     } else {
@@ -49,7 +49,7 @@ fn short(code: u16) -> Option<Access> {
         0b01111 => (true, 1),
         0b10000 => (false, 2),
         0b10001 => (true, 2),
-        // With an index in a register.
+        // The index is in a register.
         0b01010 | 0b01011 => match code >> 9 & 7 {
             0 => (false, 4),
             1 => (false, 2),

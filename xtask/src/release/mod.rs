@@ -74,7 +74,7 @@ fn make() -> Result<Made> {
     let unpacked = folder.join(&name);
     std::fs::create_dir_all(unpacked.join("completions"))?;
     std::fs::create_dir_all(unpacked.join("man"))?;
-    // Lines on building from source are removed.
+    // The archive contains the program without its symbols.
     run(command("strip", &["-o"])
         .arg(unpacked.join("host-fit"))
         .arg(&built))?;

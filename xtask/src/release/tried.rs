@@ -49,7 +49,7 @@ pub(super) fn archive(made: &Made) -> Result<()> {
         "its version"
     );
 
-    // Every command has a page and is completed.
+    // Every command must have a manual page and must be in the completion scripts.
     let help = said(&["--help"])?;
     let commands = help.lines().skip_while(|line| *line != "Commands:").skip(1);
     let commands: Vec<&str> = commands
@@ -91,7 +91,7 @@ pub(super) fn archive(made: &Made) -> Result<()> {
     let parts: Value = serde_json::from_str(&read(&unpacked.join(PARTS))?)?;
     let parts = parts["components"].as_array().map_or(0, Vec::len);
     ensure!(parts > 50, "{PARTS} lists {parts} crates");
-    // Crates that are deep in the tree, and the pages' library.
+    // The licences include those of crates deep in the dependency tree, and of the pages' library.
     let notices = read(&unpacked.join(NOTICES))?;
     for part in ["faer ", "serde_core "] {
         ensure!(notices.contains(part), "{NOTICES} does not name {part}");
@@ -158,10 +158,10 @@ pub(super) fn wheel(made: &Made) -> Result<()> {
     let folder = &elsewhere.0;
     let environment = folder.join("venv");
     let python = crate::setup::python()?;
-    // NumPy is the system's and is not downloaded.
+    // NumPy of the system is used and not downloaded.
     run(command(python, &["-m", "venv", "--system-site-packages"]).arg(&environment))?;
     std::fs::create_dir_all(folder.join("out/demo"))?;
-    // In place of the demo's model, which would take a minute to identify.
+    // This model replaces the demo's model, which would take a minute to identify.
     std::fs::copy(
         root().join("data/paper/table-2-state-dependent.toml"),
         folder.join("out/demo/hidden-after.toml"),

@@ -6,7 +6,7 @@ use crate::plant::effects::physics;
 use crate::plant::part::{JetPart, Part, Piece};
 
 physics! {
-    /// Each rise of the jet adds gain·(e^(−t/τ) − e^(−t/τ_r)) per rise.
+    /// Each rise of the jet adds gain·(e^(−t/τ) − e^(−t/τ_r)) times the height of the rise.
     SlowVortex = "slow-vortex" at Shedding, like StartingVortex
     parameters(_, rng) {
         /// Strength.

@@ -81,7 +81,7 @@ mod tests {
         let first = run(&mut jet, 1.5);
         let plenum_alone = 1.0 / 1.2;
         assert!(first < plenum_alone && first > 0.7, "{first}");
-        // κ·P = (B − P)/τ_p and (1 − B)/τ_b = ρ·κ·P.
+        // In equilibrium κ·P = (B − P)/τ_p and (1 − B)/τ_b = ρ·κ·P.
         let rest = 1.0 / (1.0 + 0.2 + 3.0 * 0.1);
         assert!((run(&mut jet, 40.0) - rest).abs() < 1e-6);
     }

@@ -6,7 +6,7 @@ use crate::plant::effects::physics;
 use crate::plant::part::{Moment, Part, SensorPart};
 
 physics! {
-    /// Reading times 1 − loss·(1 − exp(−t/time)), t the time in the record.
+    /// The reading is multiplied by 1 − loss·(1 − exp(−t/time)), with the time in the record t.
     FadingSensitivity = "fading-sensitivity" at Film
     parameters(_, rng) {
         /// Final loss.

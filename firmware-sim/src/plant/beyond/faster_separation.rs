@@ -11,9 +11,9 @@ physics! {
     /// pulse.
     FasterSeparation = "faster-separation" at Flow
     parameters(_, rng) {
-        /// Relative increase after an infinitely long pulse.
+        /// Relative increase of the rate after an infinitely long pulse.
         gain ["-", NOT_NEGATIVE] = rng.random_range(0.8..2.5);
-        /// Time constant of the pulse length.
+        /// Time constant with which the increase grows with the pulse length.
         time ["s", TIME] = log_uniform(rng, 0.10, 0.40);
     }
     part(law, _) {

@@ -6,14 +6,15 @@ use crate::plant::effects::physics;
 use crate::plant::part::{JetPart, Part, Piece};
 
 physics! {
-    /// time·ḣ = u − h; strength 1 − loss·h²/(h² + knee²).
+    /// The jet has the strength 1 − loss·h²/(h² + knee²), with the heat h of the valve: time·ḣ = u
+    /// − h.
     HotJet = "hot-jet" at Plenum
     parameters(_, rng) {
         /// Largest loss.
         loss ["-", FINITE] = rng.random_range(0.35..0.65);
         /// Time constant of heating and cooling.
         time ["s", TIME] = log_uniform(rng, 0.5, 2.0);
-        /// Heat at half of the loss; 1 is steady blowing.
+        /// Heat at which half of the loss occurs. Under steady blowing the heat becomes 1.
         knee ["-", POSITIVE] = rng.random_range(0.3..0.6);
     }
     part(law, _) {

@@ -5,7 +5,7 @@ use crate::plant::effects::physics;
 use crate::plant::part::{Moment, Part, SensorPart};
 
 physics! {
-    /// Reading times 1 − loss from `at` on.
+    /// The reading is multiplied by 1 − loss from the time `at` on.
     LateSlip = "late-slip" at Film
     parameters(_, rng) {
         /// Loss.

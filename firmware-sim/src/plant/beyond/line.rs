@@ -8,7 +8,8 @@ use crate::plant::part::{JetPart, Part, Piece};
 
 /// The law of the line's delay.
 pub(super) trait LineLaw: Clone + Debug + Send + Sync + 'static {
-    /// The delay of a command issued at `t`, the last of these `pulses` (s, ≥ 0).
+    /// Delay of a command that is issued at the time `t` (s, ≥ 0), given the `pulses` up to this
+    /// time.
     fn takes(&self, pulses: &Pulses, t: f64) -> f64;
 }
 

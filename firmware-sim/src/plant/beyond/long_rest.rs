@@ -6,7 +6,7 @@ use super::{Port, Truth};
 use crate::plant::effects::physics;
 
 physics! {
-    /// Strength 1 − loss for the whole pulse after a rest longer than `rest`.
+    /// The jet has the strength 1 − loss for the whole pulse after a rest longer than `rest`.
     LongRest = "long-rest" at Plenum
     parameters(_, rng) {
         /// Loss.

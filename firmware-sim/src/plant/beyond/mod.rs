@@ -164,7 +164,7 @@ mod tests {
             physics.validate().unwrap();
             let truth = physics.truth();
             assert!(!truth.coordinates.is_empty() && !physics.parameters().is_empty());
-            // 2 Hz, with a rest of one second at the end.
+            // The command is a square wave of 2 Hz, with a rest of one second at the end.
             let on = |k: usize| k < 7500 && k % 500 >= 250;
             let command: Vec<f64> = (0..8500).map(|k| f64::from(u8::from(on(k)))).collect();
             let stream = FreeStream::draw(&mut rng, command.len());

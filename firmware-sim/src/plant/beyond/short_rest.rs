@@ -7,12 +7,13 @@ use crate::plant::base::log_uniform;
 use crate::plant::effects::physics;
 
 physics! {
-    /// Strength 1 − loss·exp(−rest/recovery), rest the pause before the pulse.
+    /// The jet has the strength 1 − loss·exp(−rest/recovery), with the pause `rest` before the
+    /// pulse.
     ShortRest = "short-rest" at Plenum
     parameters(_, rng) {
         /// Loss without any rest.
         loss ["-", FINITE] = rng.random_range(0.35..0.65);
-        /// Rest after which 63 % have recovered.
+        /// Rest after which 63 % of the loss have recovered.
         recovery ["s", TIME] = log_uniform(rng, 0.06, 0.20);
     }
     part(law, _) { jet(*law) }

@@ -12,7 +12,7 @@ physics! {
     /// jet.
     StirredLayer = "stirred-layer" at Flow
     parameters(_, rng) {
-        /// Relative increase after continuous blowing.
+        /// Relative increase of the rate after continuous blowing.
         gain ["-", NOT_NEGATIVE] = rng.random_range(0.8..2.5);
         /// Window length.
         window ["s", TIME] = log_uniform(rng, 0.25, 1.0);

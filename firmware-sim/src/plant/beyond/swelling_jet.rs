@@ -7,7 +7,7 @@ use crate::plant::base::log_uniform;
 use crate::plant::effects::physics;
 
 physics! {
-    /// Strength 1 − deficit·exp(−t/time), t since the pulse began.
+    /// The jet has the strength 1 − deficit·exp(−t/time), with the time t since the pulse began.
     SwellingJet = "swelling-jet" at Plenum
     parameters(_, rng) {
         /// Initial deficit.

@@ -7,7 +7,8 @@ use crate::plant::base::log_uniform;
 use crate::plant::effects::physics;
 
 physics! {
-    /// Strength 1 − loss·(1 − exp(−(n − 1)/pulses)), n the number of the pulse in the record.
+    /// The jet has the strength 1 − loss·(1 − exp(−(n − 1)/pulses)), with the number n of the pulse
+    /// in the record.
     TiringJet = "tiring-jet" at Plenum
     parameters(_, rng) {
         /// Final loss.

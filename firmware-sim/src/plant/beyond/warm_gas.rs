@@ -7,7 +7,7 @@ use crate::plant::free_stream::{FreeStream, MEAN_TEMPERATURE};
 use crate::plant::part::{JetPart, Part, Piece};
 
 physics! {
-    /// Strength 1 + gain·(θ − 20 °C), θ the measured temperature of the air.
+    /// The jet has the strength 1 + gain·(θ − 20 °C), with the measured temperature θ of the air.
     WarmGas = "warm-gas" at FreeStream {
         const CHANNEL: Option<&'static str> = Some(Beyond::TEMPERATURE);
     }

@@ -17,7 +17,7 @@ physics! {
         /// Friction below which the flow detaches.
         lower_threshold ["y", FINITE] = lower_threshold;
         /// Contribution of the closed relay to the drive.
-        // Without a jet the relay must release: gain below the lower threshold.
+        // Without a jet the relay must release, so the gain is below the lower threshold.
         gain ["y", FINITE] = rng.random_range(0.5..0.75) * lower_threshold;
     }
     where { let lower_threshold = rng.random_range(0.25..0.40) * base.gain; }
@@ -63,7 +63,8 @@ mod tests {
             gain: 0.2,
         };
         let mut flow = flow([relay.at_rest()]);
-        // Below the threshold there is no difference; a half-open jet has two steady levels.
+        // Below the threshold the effect makes no difference. With a half-open jet the flow has two
+        // steady levels.
         assert!((hold(&mut flow, 0.6, 2.0) - 0.6).abs() < 1e-6);
         assert!((hold(&mut flow, 1.0, 2.0) - 1.2).abs() < 1e-6);
         assert!((hold(&mut flow, 0.6, 2.0) - 0.8).abs() < 1e-6);

@@ -44,7 +44,7 @@ mod tests {
         };
         let mut flow = flow([effect.at_rest()]);
         let s = hold(&mut flow, 1.0, 3.0);
-        // Loading from rest: z = (1 − exp(−(β+γ)·s))/(β+γ).
+        // During loading from rest, z = (1 − exp(−(β+γ)·s))/(β+γ).
         let z = (1.0 - (-4.0 * s).exp()) / 4.0;
         assert!((s + 0.5 * z - 1.0).abs() < 1e-6);
         assert!(

@@ -9,7 +9,7 @@ physics! {
     DryFriction = "dry-friction" at Flow
     parameters(base, rng) {
         /// F.
-        // Sticking range around the equilibrium of the slower motion.
+        // The value is the range of sticking around the equilibrium of the slower motion.
         level ["y per sample", NOT_NEGATIVE] = rng.random_range(0.10..0.25) * SAMPLE_PERIOD_S / slow;
     }
     where { let slow = base.attach_s.max(base.separate_s); }
@@ -32,7 +32,7 @@ mod tests {
 
     #[test]
     fn dry_friction_stops_the_flow_short_of_its_equilibrium_on_both_sides() {
-        // Sticks where rate·|drive − s| = F per sample.
+        // The flow sticks where rate·|drive − s| = F per sample.
         let level = 0.002;
         let mut flow = flow([DryFriction { level }.at_rest()]);
         let band_on = level / 0.001 * 0.04;

@@ -6,7 +6,7 @@ use crate::plant::free_stream::FreeStream;
 use crate::plant::part::{JetPart, Part, Piece};
 
 physics! {
-    /// The jet's strength times 1 + gain·(U/Ū − 1).
+    /// The strength of the jet is multiplied by 1 + gain·(U/Ū − 1).
     FreeStreamVariation = "free-stream-variation" at FreeStream {
         const CHANNEL: Option<&'static str> = Some("u_inf");
     }
@@ -68,7 +68,8 @@ mod tests {
         let mut rig = Rig::new(&spec, Some(stream.clone())).unwrap();
         let y = rig.play(&vec![1.0; 10_000]);
         for k in (100..10_000).step_by(100) {
-            // A 2 ms flow closely follows the jet of 22 ms before.
+            // A flow with a time constant of 2 ms closely follows the jet, which was issued 22 ms
+            // before.
             let expected = 1.0 - 2.0 * (stream.velocity(k as f64 * 1e-3 - 0.022) / 10.0 - 1.0);
             assert!((y[k] - expected).abs() < 1e-4);
         }

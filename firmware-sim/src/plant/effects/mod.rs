@@ -485,7 +485,7 @@ pub(super) fn signed(rng: &mut ChaCha8Rng, low: f64, high: f64) -> f64 {
 }
 
 impl FlowDelay {
-    /// The effect of the catalogue that it is or resembles; none for a constant delay.
+    /// The effect of the catalogue that this delay law is or resembles; none for a constant delay.
     pub fn effect(self) -> Option<&'static str> {
         match self {
             Self::Fixed { .. } => None,

@@ -9,7 +9,7 @@ physics! {
     QuadraticDrag = "quadratic-drag" at Flow
     parameters(base, rng) {
         /// d.
-        // Resistance against the fastest motion, relative to the flow's own.
+        // The value is the resistance against the fastest motion, relative to the flow's own.
         coefficient ["samples/y", NOT_NEGATIVE] =
             rng.random_range(0.5..1.5) * fast / SAMPLE_PERIOD_S;
     }
@@ -39,7 +39,7 @@ mod tests {
             20.0 * (hold(flow, jet, 5e-5) - before)
         };
         let mut flow = flow([QuadraticDrag { coefficient: 30.0 }.at_rest()]);
-        // First sample of a step: v + d·v² = 1/40 per sample.
+        // In the first sample of a step, v + d·v² = 1/40 per sample.
         let rising: f64 = speed(&mut flow, 1.0);
         assert!((rising + 30.0 * rising * rising - 0.025).abs() < 2e-5);
         hold(&mut flow, 1.0, 5.0);

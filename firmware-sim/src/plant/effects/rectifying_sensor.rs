@@ -1,4 +1,4 @@
-//! A sensor that loses the sign.
+//! A sensor that measures only the magnitude of the friction and loses its sign.
 
 use super::ShowsWith;
 use crate::plant::effects::physics;

@@ -23,7 +23,7 @@ fn main() -> ! {
         clocks::start(&rcc, &chip.FLASH);
         let mut uart = Uart::new(chip.USART2, a.pa2, a.pa3, &mut rcc);
         let cases = Measured::new(Cycles::new(core.DCB, core.DWT));
-        // In static memory, so that the stack measurement covers calls only.
+        // The server is in static memory, so that the stack measurement covers calls only.
         if let Some(server) = cortex_m::singleton!(: Server<Measured<Cycles>> = Server::new(cases))
         {
             loop {

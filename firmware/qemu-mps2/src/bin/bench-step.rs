@@ -1,5 +1,5 @@
-//! Instructions of one step of Table II's model: model-core's, those of C by hand and
-//! those of the exported C, in one run. Sends nine numbers over the serial line and stops.
+//! Counts the instructions of one step of Table II's model in model-core, in hand-written C and in
+//! the exported C, in one run. Sends nine numbers over the serial line and stops.
 #![no_std]
 #![no_main]
 
@@ -37,14 +37,16 @@ fn main() -> ! {
         let (mut own, mut peer, mut apart) = (0_u32, 0_u32, 0.0_f32);
         let (mut own_most, mut peer_most) = (0, 0);
         let (mut exported, mut exported_most, mut differ) = (0_u32, 0, 0_u32);
-        // SAFETY: the exported model keeps its state to itself and is called from here only.
+        // SAFETY: the state of the exported model is private, and the model is called from here
+        // only.
         unsafe { model_reset() };
         for k in 0..STEPS {
             let on = command(k);
             let (ours, taken) = ticks.measure(|| own_step(&mut state, on));
             own += taken;
             own_most = taken.max(own_most);
-            // SAFETY: the peer keeps its state to itself and is called from here only.
+            // SAFETY: the state of the model in C by hand is private, and the model is called from
+            // here only.
             let (theirs, taken) = ticks.measure(|| unsafe { peer_step(on.into()) });
             peer += taken;
             peer_most = taken.max(peer_most);

@@ -15,7 +15,7 @@ fn main() -> ! {
     if let Some(core) = cortex_m::Peripherals::take() {
         let mut uart = Line::new(core.ITM);
         let cases = Measured::new(Ticks::new(core.SYST));
-        // In static memory, because the stack measurement covers calls only.
+        // The server is in static memory, because the stack measurement covers calls only.
         if let Some(server) = cortex_m::singleton!(: Server<Measured<Ticks>> = Server::new(cases)) {
             loop {
                 if let Some(byte) = uart.receive() {

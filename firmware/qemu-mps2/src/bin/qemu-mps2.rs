@@ -29,7 +29,8 @@ use wire::Outbox;
 
 /// SysTick ticks per sample, at 25 MHz.
 const TICKS_PER_SAMPLE: u32 = 25 * on_board::PERIOD_US;
-/// In loops of `cortex_m::asm::delay`: two instructions of 32 ns each.
+/// Two and a half sample periods, in loops of `cortex_m::asm::delay` with two instructions of 32 ns
+/// each.
 const TWO_AND_A_HALF_PERIODS: u32 = TICKS_PER_SAMPLE / 2 * 5 * 40 / 64;
 /// Watchdog timeout in its ticks, at 25 MHz.
 const PATIENCE: u32 = 25 * on_board::PATIENCE_US;
@@ -143,7 +144,7 @@ fn main() -> ! {
         uart.work(&mut outbox, on_board::PERIOD_US);
         while let Some(byte) = uart.receive() {
             match byte {
-                // Within frames such bytes are data.
+                // While frames arrive, such a byte is data and does not inject a fault.
                 _ if desk.frames_come() => {
                     desk.receive(byte, rig.controller(), &mut outbox);
                 }

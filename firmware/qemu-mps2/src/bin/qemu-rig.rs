@@ -3,7 +3,8 @@
 //!
 //! The rig is the sample clock, like the converter of a real board. For every sample it sends four bytes:
 //! [`PRESSED`] or 0 for the reset button, and 12 bits each of sensor and channel. It receives one byte, 1 for an
-//! open valve. However fast the samples are, the line to the host transmits as much as 115 200 baud in a period.
+//! open valve. In each sample period the line to the host transmits as much as a line of 115 200 baud would,
+//! even if the samples are faster.
 #![no_std]
 #![no_main]
 

@@ -294,7 +294,7 @@ fn the_law_is_shown_with_reference_model_and_residual() {
     assert_eq!(bench.status(), Some((Status::Done, 0)));
     let laws: Vec<_> = bench.samples.iter().filter_map(|(_, s, _)| s.law).collect();
     assert!(laws.len() > 950);
-    // Readings of 800 to 806 counts, independent of the model.
+    // The readings are 800 to 806 counts, independent of the model.
     for ((_, sample, _), law) in bench.samples.iter().rev().zip(laws.iter().rev()) {
         let y = f32::from(sample.counts);
         assert!((y - law.model - law.residual).abs() <= 2.0 / wire::samples::STEPS);
@@ -375,7 +375,7 @@ fn garbage_opens_no_valve() {
     let mut seed = 3_u32;
     for k in 0..60_000_u32 {
         seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        // Every second interval without zero bytes, as an operator would type.
+        // Every second interval has no zero bytes, like the input that an operator types.
         let byte = (seed >> 24) as u8;
         if (k / 1000) % 3 > 0 {
             bench.say(&[if (k / 1000) % 3 == 1 { byte | 1 } else { byte }]);

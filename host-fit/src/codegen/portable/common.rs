@@ -9,7 +9,8 @@ use model_core::Real;
 use model_core::effect::Place;
 use model_core::recursion::Grading;
 
-/// The signal of an effect and the statement that takes its value, `{}`.
+/// The signal on which an effect acts, and the statement that receives the effect's result in place
+/// of `{}`.
 pub(super) type Port<'a> = [&'a str; 2];
 
 /// Where effects act, in the words of a language.
@@ -92,8 +93,8 @@ pub(super) fn holes<T: Real>(sheet: &Sheet<'_>, tongue: &dyn Tongue, ports: &Por
     holes
 }
 
-/// Sets the texts of the recursion and of its inputs; `sum` writes a sum of products of coefficients and the flow so
-/// many samples back.
+/// Sets the texts of the recursion and of its inputs; `sum` writes a sum of products of coefficients and past values
+/// of the flow at given lags.
 pub(super) fn recursion(
     holes: &mut Holes,
     sheet: &Sheet<'_>,

@@ -154,7 +154,7 @@ fn holes(sheet: &Sheet<'_>, name: &str) -> Holes {
         Grading::Switched => "min(max(0.5 + (arrived - 0.5) * 50, 0), 1)",
     };
     holes
-        // With a space, because `%{` would begin a block comment.
+        // A space follows `%`, because `%{` would begin a block comment.
         .set(
             "header",
             lines(sheet.header.iter().map(|line| format!("% {line}"))),

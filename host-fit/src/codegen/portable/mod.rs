@@ -67,7 +67,7 @@ pub fn matlab(model: &Model, name: &str) -> Result<String, CodegenError> {
 pub fn function_name(name: &str) -> String {
     let clean = |c: char| if c.is_ascii_alphanumeric() { c } else { '_' };
     let name: String = name.chars().map(clean).take(40).collect();
-    // Begins with a letter, and is not a keyword of the language.
+    // The name must begin with a letter and must not be a keyword of the language.
     const TAKEN: [&str; 6] = ["end", "for", "function", "if", "law", "while"];
     if name.starts_with(|c: char| c.is_ascii_alphabetic()) && !TAKEN.contains(&name.as_str()) {
         name

@@ -150,7 +150,7 @@ impl Piece {
             channel: made.channel,
             reference: T::from_f64(made.reference),
         };
-        // Any place will do: it determines only the hook that would run the program.
+        // The place has no influence here: it determines only the hook that would run the program.
         let host = UserEffect::of(program, Place::Jet, &parameters, &setting);
         let values = (0..program.ops.len()).map(|r| host.constant(r).value());
         let taps = (0..program.lines).map(|line| {
@@ -205,7 +205,8 @@ impl Piece {
             self.uses[register] += 1;
             varying[register] = true;
         }
-        // From the last to the first: a constant is needed if a needed constant depends on it.
+        // The operations are visited from the last to the first, because a constant is needed if a
+        // needed constant depends on it.
         let plain = |op: &Op| {
             matches!(
                 op,
@@ -355,7 +356,7 @@ impl Piece {
                 Binary::GreaterOrEqual => infix(x, ">=", y, COMPARISON),
                 Binary::Equal => infix(x, "==", y, COMPARISON),
                 Binary::Unequal => infix(x, unequal, y, COMPARISON),
-                // In parentheses, because languages differ in their precedence.
+                // Parentheses are written, because the languages differ in precedence.
                 Binary::And => Text::atom(format!("(({}) {and} ({}))", of(x).0, of(y).0)),
                 Binary::Or => Text::atom(format!("(({}) {or} ({}))", of(x).0, of(y).0)),
             },

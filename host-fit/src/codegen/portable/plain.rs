@@ -25,7 +25,7 @@ pub(super) fn c_string(text: &str) -> String {
     let byte = |b: u8| match b {
         b'"' | b'\\' | b'?' => format!("\\{}", char::from(b)),
         b' '..=b'~' => char::from(b).to_string(),
-        // Three digits, so that a following digit cannot belong to the escape.
+        // An escape has three digits, so that a following digit cannot belong to it.
         _ => format!("\\{b:03o}"),
     };
     format!("\"{}\"", text.bytes().map(byte).collect::<String>())

@@ -36,7 +36,7 @@ pub(super) struct Sheet<'a> {
     pub(super) model: &'a Model,
     pub(super) header: Vec<String>,
     pub(super) memory: Footprint,
-    /// Lags behind y_k of the a_i and of the c_jl, samples.
+    /// Lags of the coefficients a_i and c_jl, counted back from y_k, samples.
     pub(super) state_back: Vec<usize>,
     pub(super) product_back: Vec<usize>,
     /// c_jl, a row for each input.
@@ -183,7 +183,8 @@ impl<'a> Sheet<'a> {
             .filter(move |effect| effect.place == place)
     }
 
-    /// Whether the flow approaches a separate level under jets of part strength.
+    /// Whether jets of part strength have another response than in eq. (3): the flow relaxes
+    /// towards a separate level.
     pub(super) fn graded(&self) -> bool {
         self.model.grading != Grading::Proportional && self.model.b.len() == 1
     }

@@ -1,14 +1,14 @@
 //! Templates of generated files: text in the target language with holes.
 //!
-//! - `@name@` is replaced by a text. Alone in its line it may have several lines, which get the indentation of the
-//!   hole, or none.
+//! - `@name@` is replaced by a text. A hole alone in its line may be replaced by several lines, which get the
+//!   indentation of the hole, or by no line.
 //! - The lines between `@if name` and `@end` are kept if the text `name` is not empty; the lines after `@else` are kept
 //!   if it is empty.
 //! - The lines between `@for name` and `@end` are repeated for each row of the list `name`.
 
 use std::collections::BTreeMap;
 
-/// The texts of a template by name.
+/// The texts that are inserted into a template, by name.
 #[derive(Debug, Default)]
 pub(super) struct Holes {
     texts: BTreeMap<&'static str, String>,
@@ -67,7 +67,8 @@ fn fill(mut lines: &[&str], scopes: &[&Holes], filled: &mut String) {
     }
 }
 
-/// The lines up to `@else`, from there to `@end`, and after it.
+/// Splits the lines after `@if` into those up to `@else`, those from there to `@end`, and those
+/// after `@end`.
 fn block<'a, 'b>(lines: &'a [&'b str]) -> (&'a [&'b str], &'a [&'b str], &'a [&'b str]) {
     let (mut depth, mut otherwise) = (0_usize, None);
     for (i, line) in lines.iter().enumerate() {

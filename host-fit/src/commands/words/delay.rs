@@ -199,7 +199,7 @@ fn mean_words(delays: &[(f64, f64)]) -> String {
     let mean = delays.iter().map(|d| d.0).sum::<f64>() / n;
     let scatter = delays.iter().map(|d| (d.0 - mean).powi(2)).sum::<f64>();
     let scatter = (scatter / (n - 1.0).max(1.0) / n).sqrt();
-    // Every single error contains the common part.
+    // The standard error of every edge contains the part that all edges share.
     let shared = delays.iter().map(|d| d.1).fold(f64::INFINITY, f64::min);
     let error = scatter.max(shared).max(0.1);
     format!("{mean:.1} ± {error:.1} ({})", delays.len())

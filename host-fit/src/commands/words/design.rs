@@ -266,7 +266,7 @@ pub(crate) fn trial_rows(proof: &Proof) -> Vec<Vec<String>> {
     let row = |name: &str, likely: String, kept: &str, f: &Figures, steady: String| {
         let mut cells = vec![name.to_owned(), likely, kept.to_owned()];
         cells.extend([f.mean, f.rms].map(|v| format!("{v:.3}")));
-        // Without the sign of a rounded −0.
+        // Adding 0 removes the sign of a rounded −0.
         cells.push(format!("{:+.3}", (1e3 * f.offset).round() / 1e3 + 0.0));
         cells.push(format!("{:.3}", f.peak_to_peak));
         cells.push(format!("{:.1}", f.switches_per_s));
@@ -292,7 +292,8 @@ pub(crate) fn trial_rows(proof: &Proof) -> Vec<Vec<String>> {
     cases.chain([last]).collect()
 }
 
-/// Whether the table of a terminal shows this trial: the model's, the losses, and of each likelihood the largest error.
+/// Whether the table in a terminal shows this trial. It shows the trial on the model, every trial that lost attachment,
+/// and for each likelihood the trial with the largest error.
 fn is_shown(case: &Case, proof: &Proof) -> bool {
     let kind = |case: &Case| (case.group.decides(), case.group == CaseGroup::Unseen);
     let rms = case.figures.rms;

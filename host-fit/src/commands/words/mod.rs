@@ -453,7 +453,7 @@ fn law_in_words(law: &TransportLaw) -> String {
         };
         words = words.replacen("{}", &value, 1);
     }
-    // A negative coefficient after a plus.
+    // A negative coefficient is written with a minus instead of a plus.
     words.replace("+ −", "− ")
 }
 

@@ -198,7 +198,7 @@ impl ModelBench {
         Ok(json!({}))
     }
 
-    /// Refuses while a step runs.
+    /// An error while a step runs.
     fn idle(&self) -> Result<(), Refusal> {
         match self.busy.load(Ordering::Relaxed) {
             true => Err(Refusal(

@@ -23,7 +23,7 @@ fn fill(row: &mut Row, case: &Case, program: &Program, folder: &Path) -> Result<
     row.also_right = also_right.map(|name| (*name).to_owned()).collect();
     let inside = |name: &str| folder.join(name).to_string_lossy().into_owned();
     let [data, given, found] = ["set", "given.toml", "found.toml"].map(&inside);
-    // Left over from an earlier run.
+    // These files may be left over from an earlier run.
     let _ = fs::remove_dir_all(&data);
     let _ = fs::remove_file(&found);
     fs::create_dir_all(folder).map_err(|e| e.to_string())?;

@@ -92,7 +92,7 @@ mod tests {
     fn the_side_with_fewer_samples_is_the_broken_one() {
         let step = |at: f64| [(0.0, 0.1), (at - 1e-9, 0.1), (at, -0.2), (1.0, -0.2)];
         assert_eq!(f1(&set(), "y", 0.795, &step(0.795)), 1.0);
-        // Ten of twenty samples found, and no wrong one.
+        // The curve finds ten of twenty samples, and no wrong one.
         assert!((f1(&set(), "y", 0.795, &step(0.895)) - 2.0 * 10.0 / 30.0).abs() < 1e-12);
         assert_eq!(f1(&set(), "y", 0.795, &[(0.0, 0.1), (1.0, 0.1)]), 0.0);
     }

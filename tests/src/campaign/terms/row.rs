@@ -68,12 +68,12 @@ pub struct Row {
     pub over_floor: Option<f64>,
     /// Share of the unexplained variance of the best base that the curve explains.
     pub curve_taken: Option<f64>,
-    /// The same for the reported formula or curve.
+    /// The share that the reported formula or curve explains.
     pub formula_taken: Option<f64>,
     /// Reduction of the squared distance to the noise-free validation readings from the given to the final
     /// model; these are known only in the simulation.
     pub truly_taken: Option<f64>,
-    /// For physics in one region: F1 of the samples that the curve puts there.
+    /// For physics in one region: F1 score of the samples that the curve assigns to that region.
     pub region_f1: Option<f64>,
     /// For first-order flows with one lag: the larger relative error of the two time constants in the final
     /// model.
@@ -106,7 +106,7 @@ impl Row {
         self.terms.iter().find(|told| !known(told))
     }
 
-    /// A term that the rig does not have.
+    /// Whether a term is reported although the rig lacks none.
     #[must_use]
     pub fn is_needless(&self) -> bool {
         self.truths.is_empty() && self.first().is_some()

@@ -40,7 +40,7 @@ fn fill(
     row.expect(&plan);
     let inside = |name: &str| folder.join(name).to_string_lossy().into_owned();
     let [data, given, found, own] = ["set", "given.toml", "found.toml", "own.toml"].map(&inside);
-    // Left over from an earlier run.
+    // These files may be left over from an earlier run.
     let _ = fs::remove_dir_all(folder.join("set"));
     let _ = fs::remove_file(&found);
     let _ = fs::remove_file(&own);

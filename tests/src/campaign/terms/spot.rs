@@ -35,13 +35,13 @@ impl From<plant::Truth> for Truth {
 const TIMES: f64 = 2.0;
 
 impl Truth {
-    /// Whether the spot has the place.
+    /// Whether both spots have the same place.
     #[must_use]
     pub fn is_at(&self, spot: &Spot) -> bool {
         spot.place == self.place
     }
 
-    /// Whether the spot has place and coordinate.
+    /// Whether both spots have the same place and coordinate.
     #[must_use]
     pub fn is(&self, spot: &Spot) -> bool {
         let own = factors(&self.place, &spot.coordinate);

@@ -55,7 +55,7 @@ fn taken(rows: &[&Row], of: impl Fn(&Row) -> Option<f64>) -> Option<[f64; 2]> {
     let mut all: Vec<f64> = done.map(|row| of(row).unwrap_or(0.0)).collect();
     all.sort_by(f64::total_cmp);
     let last = all.len().checked_sub(1)?;
-    // The 10 % quantile: nine of ten are at least as good.
+    // The 10 % quantile is exceeded or reached by nine of ten rigs.
     let at = |share: f64| all[(share * last as f64).round() as usize];
     Some([at(0.5), at(0.1)])
 }

@@ -29,7 +29,8 @@ pub(super) struct Drawn {
     pub(super) dead_time: Option<f64>,
     /// The channel that drives y as well.
     pub(super) input: Option<&'static str>,
-    /// Whether a disturbance is in y that no effect describes, so that "unexplained" is right too.
+    /// Whether y contains a disturbance that no effect describes. The verdict "unexplained" is then
+    /// also right.
     pub(super) disturbed: bool,
     /// Further options of `import`.
     pub(super) import: Vec<String>,
@@ -124,7 +125,7 @@ impl Rig {
         }
     }
 
-    /// With a second lag in two of five cases.
+    /// A random rig, with a second lag in two of five cases.
     fn draw_any_order(rng: &mut ChaCha8Rng) -> Self {
         let mut rig = Self::draw(rng);
         if chance(rng, 0.4) {
@@ -325,7 +326,7 @@ fn outliers(rng: &mut ChaCha8Rng) -> Drawn {
     rig.of(vec![Record { u, y, channel }])
 }
 
-/// A quarter of the command's gain, and a separate lag and dead time.
+/// The measured input has a quarter of the command's gain, and its own lag and dead time.
 fn measured_input(rng: &mut ChaCha8Rng) -> Drawn {
     let rig = Rig::draw(rng);
     let u = rig.switched(rng, 0.0, 3.0);
@@ -426,7 +427,7 @@ fn ringing(rng: &mut ChaCha8Rng) -> Drawn {
     drawn
 }
 
-/// The lag is that of the valve.
+/// An integrator behind a valve with a lag.
 fn integrating(rng: &mut ChaCha8Rng) -> Drawn {
     let mut rig = Rig::draw(rng);
     let u = rig.switched(rng, 0.0, 2.0);

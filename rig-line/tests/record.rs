@@ -223,7 +223,7 @@ fn what_no_board_can_play_is_refused_with_the_reason() {
     let short = Command::new("short", 0.001, [false, true, false]).with_rest(200);
     assert!(refused(&mut host, &short).contains("hold time"));
     let long = Command::new("long", 0.001, (0..90_000).map(|k| k / 30 % 2 == 1));
-    assert!(refused(&mut host, &long).contains("3000 runs"));
+    assert!(refused(&mut host, &long).contains("3000 intervals"));
     // The law runs on a flow that does not respond.
     host.arm().expect("armed");
     let message = refused(&mut host, &command(1000));

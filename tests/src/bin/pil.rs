@@ -12,6 +12,9 @@ use std::time::Instant;
 /// QEMU's SysTick under `-icount shift=5`: 40 ns a tick, 32 ns an instruction.
 const INSTRUCTIONS_PER_TICK: f64 = 1.25;
 
+/// The processor clock of the Nucleo-F446RE in this project, cycles per ms.
+const CYCLES_PER_MS: f64 = 84_000.0;
+
 /// Commands of the lockstep run.
 #[derive(Parser)]
 enum Task {
@@ -110,22 +113,24 @@ fn run(
     let (mut means, mut most) = (BTreeMap::new(), BTreeMap::new());
     let (mut stack, mut base) = (0, None);
     println!(
-        "{:<30} {:>6} {:>8} {:>6} {:>7} {:>7}  law, effects",
-        "equal bit for bit", "steps", "switches", "y", "mean", "most"
+        "{:<30} {:>6} {:>8} {:>6} {:>7} {:>7} {:>6}  law, effects",
+        "equal bit for bit", "steps", "switches", "y", "mean", "most", "kHz"
     );
     let chosen = |case: &Case| only.is_none_or(|only| only == case.name);
     for (number, case) in cases.iter().enumerate().filter(|(_, case)| chosen(case)) {
         let measured = run_case(&mut link, u8::try_from(number)?, case)?;
         let Measured { report, .. } = &measured;
         let mean = report.ticks as f64 * per_tick / f64::from(report.steps.max(1));
+        let worst = f64::from(report.most) * per_tick;
         println!(
-            "{:<30} {:>6} {:>8} {:>6.3} {:>7.0} {:>7.0}  {}",
+            "{:<30} {:>6} {:>8} {:>6.3} {:>7.0} {:>7.0} {:>6.1}  {}",
             case.name,
             report.steps,
             measured.switches,
             measured.friction,
             mean,
-            f64::from(report.most) * per_tick,
+            worst,
+            CYCLES_PER_MS / worst.max(1.0),
             words(&case.model),
         );
         if base.is_none() || case.name == "base" {
@@ -133,8 +138,15 @@ fn run(
         }
         stack = report.stack;
         means.insert(&case.name, mean);
-        most.insert(&case.name, f64::from(report.most) * per_tick);
+        most.insert(&case.name, worst);
     }
+    let cycles = match unit {
+        "instructions" => ", if an instruction takes one cycle",
+        _ => "",
+    };
+    println!(
+        "mean and most: {unit} of a sample; kHz: the loop rate at which the worst sample fills a core of 84 MHz{cycles}"
+    );
     println!(
         "link: {} bytes lost on purpose, {} requests repeated, no wrong answer; {:.1} s",
         link.lost,

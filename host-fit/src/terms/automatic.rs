@@ -5,6 +5,7 @@ use super::bench::Bench;
 use super::evidence::p_value;
 use super::hypothesis::Hypothesis;
 use super::judge::{Judge, Judged};
+use super::likely_delay::at_the_likely_delay;
 use super::linear::{self, second_order};
 use super::search::{Found, Search};
 use super::settled::{Settled, settled};
@@ -207,6 +208,8 @@ pub fn base_model(
         evaluations,
         stop,
     } = settled(&judge, judged, &how.settings, snapshots, interrupt);
+    progress("the dead time under the noise model");
+    let judged = at_the_likely_delay(&judge, judged, interrupt);
     let final_model = |judged: &Judged| units.model_out(&judge.final_fit(judged).model);
     let mut others: Vec<&Hypothesis> = found.all.iter().chain(&roots).collect();
     others.sort_by(|a, b| a.judged.size().total_cmp(&b.judged.size()));

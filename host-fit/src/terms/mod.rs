@@ -21,6 +21,7 @@ mod instead;
 mod judge;
 mod laws;
 mod likelihood;
+mod likely_delay;
 mod linear;
 mod proposal;
 mod pruning;

@@ -178,7 +178,7 @@ impl Finder<'_> {
         let term = &found.term;
         let told = |term: &Term| Alike {
             place: term.entry.place(),
-            coordinate: coordinate_words(term.entry, term),
+            coordinate: coordinate_words(term.entry, &term.coordinate.out(self.units)),
         };
         // If one coordinate enters one place in two forms, they are reported as one finding.
         let same = |other: &Term| other.is_like(term) || told(other) == told(term);

@@ -75,7 +75,10 @@ pub fn glance(model: &Model, records: &[Record], interrupt: &AtomicBool) -> Opti
     let first = context.all(&Entry::ALL).into_iter().next()?;
     (first.score < 0.0).then(|| Glance {
         place: first.term.entry.place(),
-        coordinate: outcome::coordinate_words(first.term.entry, &first.term),
+        coordinate: outcome::coordinate_words(
+            first.term.entry,
+            &first.term.coordinate.out(&bench.units),
+        ),
         error_taken_percent: 100.0 * first.held_out,
     })
 }

@@ -208,7 +208,14 @@ fn answer(discovery: &Discovery) -> Answer {
         )
     });
     let each: Vec<String> = each.collect();
+    let is_stable = |term: &FoundTerm| term.stability_percent >= 100.0 * DISCOVER.stable;
+    // Other terms together win more often than the best one.
+    let is_undecided = |term: &FoundTerm| term.stability_percent < 50.0;
     let verdict = match each.as_slice() {
+        _ if discovery.terms.iter().any(is_undecided) => {
+            "something is missing; these records do not determine its place and coordinate"
+                .to_owned()
+        }
         [one] => format!("a term is missing {one}"),
         several => format!("terms are missing {}", several.join(" and ")),
     };
@@ -231,17 +238,21 @@ fn answer(discovery: &Discovery) -> Answer {
     });
     let sure = discovery.terms.iter().map(|term| {
         let p = p_bound(term.p_value);
-        let stable = term.stability_percent;
-        let stable = match stable >= 100.0 * DISCOVER.stable {
+        let share = term.stability_percent;
+        let stable = match is_stable(term) {
             true => {
-                format!("stable: the same term wins in {stable:.0} % of the bootstrap resamples")
+                format!("stable: the same term wins in {share:.0} % of the bootstrap resamples")
             }
             false => format!(
-                "not stable: the same term wins in only {stable:.0} % of the bootstrap resamples"
+                "not stable: the same term wins in only {share:.0} % of the bootstrap resamples"
             ),
         };
+        let which = match discovery.terms.len() {
+            1 => String::new(),
+            _ => format!("At the {} with {}: ", term.place.word(), term.coordinate),
+        };
         format!(
-            "p {p} over {} candidate curves; {stable}.",
+            "{which}p {p} over {} candidate curves; {stable}.",
             discovery.looked_at
         )
     });

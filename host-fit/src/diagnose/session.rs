@@ -146,6 +146,7 @@ impl Session<'_> {
         // The ladder ends with the final model.
         if order.is_empty() && ladder.last().and_then(|rung| rung.model.as_ref()) != Some(&model) {
             let step = match last.terms.is_empty() {
+                true if found.root.is_given() => "the given model, refitted".to_owned(),
                 true => refitted,
                 false => format!("with {}", last.words()),
             };

@@ -49,7 +49,7 @@ impl Search<'_> {
             && let Ok(judged) = judge.refitted(model)
             && judged.rmse() < origin.judged.rmse()
         {
-            let from_given = self.run_within(Hypothesis::new(judged), None, &mut effort);
+            let from_given = self.run_within(Hypothesis::of_given(judged), None, &mut effort);
             if from_given.best.judged.rmse() < below * reached {
                 found = from_given;
             }

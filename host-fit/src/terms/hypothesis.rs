@@ -34,6 +34,19 @@ impl Hypothesis {
         }
     }
 
+    /// The given model, refitted, as a starting point.
+    pub(crate) fn of_given(judged: Judged) -> Self {
+        Self {
+            from_given: true,
+            ..Self::new(judged)
+        }
+    }
+
+    /// Whether this root of a search is the given model, refitted.
+    pub(crate) fn is_given(&self) -> bool {
+        self.from_given && self.terms.is_empty()
+    }
+
     /// Whether the hypothesis has no effect among its terms.
     #[must_use]
     pub fn is_bare(&self) -> bool {

@@ -13,11 +13,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 /// `judged` with its whole-sample delays moved together to the largest likelihood, if the validation error rises by no
 /// more than rounding of the delays may raise it. The parameters are refitted.
-pub(super) fn at_the_likely_delay(
-    judge: &Judge,
-    judged: Judged,
-    interrupt: &AtomicBool,
-) -> Judged {
+pub(super) fn at_the_likely_delay(judge: &Judge, judged: Judged, interrupt: &AtomicBool) -> Judged {
     let model = judged.model();
     if !matches!(model.delay, Delay::Fixed { .. }) {
         return judged;

@@ -197,8 +197,8 @@ function drawModel(s) {
         const p = interval(effect, name);
         return [`${effect}: ${name}`, `${value(number, unit)}${p ? ` (${significant(p.low, 3)}\u00a0…\u00a0${significant(p.high, 3)})` : ""}`];
       }), (i) => i > 0)] : []),
-    ...(model.base.length ? [table(["coefficient", "lag", "value"],
-      model.base.map(([name, lag, number, unit]) => [name, lag, value(number, unit)]), (i) => i > 0)] : []),
+    ...(model.base.length ? [table(["coefficient", "value"],
+      model.base.map(([name, lag, number, unit]) => [`${name}${lag ? ` (lag ${lag})` : ""}`, value(number, unit)]), (i) => i > 0)] : []),
   );
 }
 
@@ -302,8 +302,8 @@ function drawLaw(s) {
   const { law } = s;
   section("loop", law !== null);
   if (!law) return;
-  // The trials are many rows: on a narrow screen they open when they are asked for.
-  const open = /** @type {HTMLDetailsElement | null} */ (document.querySelector("#law details"))?.open ?? !narrow.matches;
+  // The trials are many rows: they open when they are asked for, and stay as they are.
+  const open = /** @type {HTMLDetailsElement | null} */ (document.querySelector("#law details"))?.open ?? false;
   place("law").replaceChildren(
     picture(law.picture),
     ...law.words.split("\n").map((line) => el("p", {}, ...inline(line))),

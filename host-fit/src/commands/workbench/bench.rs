@@ -548,21 +548,18 @@ fn base_parameters(model: &Model) -> Vec<[String; 4]> {
     let row = |name: String, lag: String, value: f64, unit: &str| {
         [name, lag, significant(value, 4), unit.to_owned()]
     };
-    let lag_of = |lag: u16| {
-        format!(
-            "{lag} samples, {}",
-            time(f64::from(lag) * model.sample_period_s, 3)
-        )
+    let samples = |lag: u16| match lag {
+        1 => "sample",
+        _ => "samples",
     };
+    let long = |lag: u16| time(f64::from(lag) * model.sample_period_s, 3);
+    let lag_of = |lag: u16| format!("{lag} {}, {}", samples(lag), long(lag));
     let mut rows = Vec::new();
     match &model.delay {
         Delay::Fixed { delays } => {
             for (input, delay) in (1..).zip(delays) {
                 let name = format!("delay of input {input}");
-                let unit = format!(
-                    "samples, {}",
-                    time(f64::from(*delay) * model.sample_period_s, 3)
-                );
+                let unit = format!("{}, {}", samples(*delay), long(*delay));
                 rows.push(row(name, String::new(), f64::from(*delay), &unit));
             }
         }

@@ -23,13 +23,11 @@ pub(super) fn recoloured(picture: &str, colours: &[&str]) -> String {
     let mut parts = picture.split('#');
     let mut text = parts.next().unwrap_or_default().to_owned();
     for part in parts {
-        let series = SERIES.iter().zip(colours);
-        let replaced = series
-            .filter_map(|(series, colour)| {
-                let rest = part.strip_prefix(series.trim_start_matches('#'))?;
-                Some((*colour, rest))
-            })
-            .next();
+        let mut series = SERIES.iter().zip(colours);
+        let replaced = series.find_map(|(series, colour)| {
+            let rest = part.strip_prefix(series.trim_start_matches('#'))?;
+            Some((*colour, rest))
+        });
         match replaced {
             Some((colour, rest)) => {
                 text.push_str(colour);

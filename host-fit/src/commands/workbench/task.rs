@@ -409,3 +409,23 @@ impl Task {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use model_core::control::{Reachable, Unreachable};
+
+    #[test]
+    fn a_level_that_cannot_be_held_names_its_field() {
+        let error = Unreachable {
+            reference: 99.0,
+            reachable: Reachable {
+                low: 0.0,
+                high: 0.8,
+            },
+        };
+        let told = of_the_field(&error.to_string());
+        assert!(told.starts_with("--target 99 cannot be held"), "{told}");
+        assert!(told.ends_with("choose a level inside"), "{told}");
+    }
+}

@@ -435,6 +435,7 @@ function begins(name) {
   if (!state) return;
   state.work = { name, now: "", best: [], budget: 0, elapsed_s: 0, stage_s: 0 };
   drawWork(state);
+  place("right").scrollTop = 0;
 }
 
 /** A step has ended. @param {string | null} error */

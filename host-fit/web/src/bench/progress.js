@@ -25,7 +25,7 @@ export function stage(work) {
 export function said({ now, best }) {
   const last = best.at(-1);
   if (!last) return now;
-  return `${now}${now ? ": " : ""}${last[0]} evaluations, best error norm ε = ${significant(last[1])} (unit of y)`;
+  return `${now}${now ? ": " : ""}${last[0]} evaluation${last[0] === 1 ? "" : "s"}, best error norm ε = ${significant(last[1])} (unit of y)`;
 }
 
 export function clear() {
@@ -55,7 +55,7 @@ export function progress(best) {
       cursor: { show: false },
       // The first guesses are far worse than the last.
       scales: { x: { time: false }, y: { distr: 3 } },
-      axes: [{ ...axis, label: "evaluations", incrs: [1, 2, 5].flatMap((n) => [n, 10 * n, 100 * n, 1e3 * n, 1e4 * n, 1e5 * n]).sort((a, b) => a - b) }, { ...axis, values, label: "best ε so far (unit of y)", size: 70 }],
+      axes: [{ ...axis, label: "evaluations", incrs: [1, 2, 5].flatMap((n) => [n, 10 * n, 100 * n, 1e3 * n, 1e4 * n, 1e5 * n]).sort((a, b) => a - b) }, { ...axis, values, label: "best ε (y)", size: 70 }],
       series: [{}, { stroke: colour("--s0"), width: 2, points: { show: false } }],
     },
     data,

@@ -24,6 +24,8 @@ struct Shared {
 struct Running {
     name: String,
     now: String,
+    /// Start of the present stage.
+    stage_started: Instant,
     /// Best value of the running search so far, over its evaluations.
     best: Vec<(usize, f64)>,
     /// Largest number of evaluations of that search; 0 for none.
@@ -32,11 +34,20 @@ struct Running {
 }
 
 impl Running {
-    /// Stores the best value of a search; fewer evaluations than before belong to another search.
+    /// Starts another stage, without results of the previous one.
+    fn stage(&mut self) {
+        self.stage_started = Instant::now();
+        self.best.clear();
+        self.budget = 0;
+    }
+
+    /// Stores the best value of a search; fewer evaluations or a higher value than before belong to another search.
     fn note(&mut self, evaluations: usize, best: f64) {
         const KEPT: usize = 1000;
-        if self.best.last().is_some_and(|last| evaluations < last.0) {
-            self.best.clear();
+        // A search never loses its best value.
+        let is_another = |last: &(usize, f64)| evaluations < last.0 || best > last.1;
+        if self.best.last().is_some_and(is_another) {
+            self.stage();
         }
         // Of an interval with a constant value only the two ends are stored.
         if let [.., before, last] = self.best.as_slice()
@@ -79,12 +90,27 @@ impl Work {
         &self.shared.cancel
     }
 
-    /// The present activity of the task, in words.
+    /// A stage of the task begins.
+    pub fn begins(&self, words: &str) {
+        self.says(words, true);
+    }
+
+    /// The present activity of the task, in words. Words that differ in more than their numbers are another stage.
     pub fn now(&self, words: &str) {
+        self.says(words, false);
+    }
+
+    fn says(&self, words: &str, begins: bool) {
+        let mut stage = begins;
         if let Some(running) = lock(&self.shared.running).as_mut() {
+            let letters = |text: &str| text.replace(|c: char| c.is_ascii_digit(), "");
+            stage |= letters(&running.now) != letters(words);
+            if stage {
+                running.stage();
+            }
             words.clone_into(&mut running.now);
         }
-        self.tell(&json!({"kind": "now", "words": words}));
+        self.tell(&json!({"kind": "now", "words": words, "stage": stage}));
     }
 
     /// The best value of a search after this many evaluations of a `budget`.
@@ -122,6 +148,7 @@ impl Work {
             Some(r) => json!({
                 "name": r.name, "now": r.now, "best": r.best, "budget": r.budget,
                 "elapsed_s": r.started.elapsed().as_secs_f64(),
+                "stage_s": r.stage_started.elapsed().as_secs_f64(),
             }),
         }
     }
@@ -138,6 +165,7 @@ impl Work {
             best: Vec::new(),
             budget: 0,
             started: Instant::now(),
+            stage_started: Instant::now(),
         });
         drop(running);
         self.shared.cancel.store(false, Ordering::Relaxed);
@@ -171,6 +199,16 @@ mod tests {
             work.best(evaluations, 0, best);
         }
         assert_eq!(work.state()["best"], json!([[1, 4.0], [3, 1.0]]));
+        // Other words are another stage; the same words with another number are not.
+        for (words, left) in [("fold 1 of 3", 0), ("fold 2 of 3", 1)] {
+            work.now(words);
+            assert_eq!(work.state()["best"].as_array().unwrap().len(), left);
+            work.best(5, 0, 0.5);
+        }
+        work.best(6, 0, 0.7);
+        assert_eq!(work.state()["best"], json!([[6, 0.7]]));
+        work.begins("fold 2 of 3");
+        assert_eq!(work.state()["best"], json!([]));
         work.end(None);
         assert!(work.state().is_null());
     }

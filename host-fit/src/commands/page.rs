@@ -137,7 +137,12 @@ pub(crate) fn extension(
 }
 
 fn run<'a>(label: &'a str, model: &'a Model, runs: &'a [Vec<f64>]) -> Run<'a> {
-    Run { label, model, runs }
+    Run {
+        label,
+        model,
+        runs,
+        colour: None,
+    }
 }
 
 /// Label and free runs of each model.

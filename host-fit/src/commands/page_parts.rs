@@ -28,6 +28,14 @@ pub(crate) struct Run<'a> {
     pub(crate) label: &'a str,
     pub(crate) model: &'a Model,
     pub(crate) runs: &'a [Vec<f64>],
+    /// Colour index of the model's curves; `None` for its position among the runs.
+    pub(crate) colour: Option<usize>,
+}
+
+/// Colour index of each run.
+fn colours(runs: &[Run<'_>]) -> Vec<usize> {
+    let each = runs.iter().enumerate();
+    each.map(|(i, run)| run.colour.unwrap_or(i)).collect()
 }
 
 /// The interval in which a run has its largest error.
@@ -250,11 +258,11 @@ pub(crate) fn check_figures(records: &[Record], runs: &[Run<'_>]) -> Vec<Figure>
 
 /// A solid line for each model, in its colour.
 fn curves<'a>(runs: &[Run<'a>], points: impl Iterator<Item = &'a [(f64, f64)]>) -> Vec<Line<'a>> {
-    let labels = runs.iter().map(|run| run.label).enumerate();
-    let line = |((i, label), points)| Line {
+    let labels = runs.iter().map(|run| run.label).zip(colours(runs));
+    let line = |((label, colour), points)| Line {
         label,
         points,
-        colour: Some(i),
+        colour: Some(colour),
         dashed: false,
     };
     labels.zip(points).map(line).collect()
@@ -316,7 +324,8 @@ fn responses(runs: &[Run<'_>]) -> Option<Figure> {
     let found: Vec<_> = runs.iter().map(|run| step_response(run.model)).collect();
     let labels = labels(runs, ["opening from rest", "closing from steady"]);
     let mut drawn = Vec::new();
-    for (i, (response, [opening, closing])) in found.iter().zip(&labels).enumerate() {
+    let curves = found.iter().zip(&labels).zip(colours(runs));
+    for ((response, [opening, closing]), colour) in curves {
         let Some(response) = response else { continue };
         for (label, points, dashed) in [
             (opening, &response.opening, false),
@@ -325,7 +334,7 @@ fn responses(runs: &[Run<'_>]) -> Option<Figure> {
             drawn.push(Line {
                 label,
                 points,
-                colour: Some(i),
+                colour: Some(colour),
                 dashed,
             });
         }
@@ -393,8 +402,8 @@ fn over_records(
     let curves: Vec<FrequencyCurve<'_>> = runs
         .iter()
         .zip(&points)
-        .enumerate()
-        .map(|(colour, (run, points))| FrequencyCurve {
+        .zip(colours(runs))
+        .map(|((run, points), colour)| FrequencyCurve {
             label: run.label,
             points,
             colour,
@@ -433,7 +442,7 @@ fn at_levels(runs: &[Run<'_>], levels: &[[Option<FrequencyResponse>; 2]]) -> Opt
         .map(|levels| levels.each_ref().map(|level| level.as_ref().map(values)))
         .collect();
     let mut curves = Vec::new();
-    for (colour, (points, labels)) in points.iter().zip(&labels).enumerate() {
+    for ((points, labels), colour) in points.iter().zip(&labels).zip(colours(runs)) {
         for ((points, label), dashed) in points.iter().zip(labels).zip([false, true]) {
             let Some(points) = points else { continue };
             curves.push(FrequencyCurve {

@@ -6,8 +6,8 @@ import { button, el, inline, options, picture, place, table } from "./bench/dom.
 import * as editor from "./bench/editor.js";
 import * as importer from "./bench/importer.js";
 import { grips } from "./bench/panes.js";
-import { clear, left, progress } from "./bench/progress.js";
-import { ask, attempt, complain, fileOf, run, token } from "./bench/server.js";
+import { clear, left, progress, said, stage } from "./bench/progress.js";
+import { ask, attempt, complain, ended, fileOf, run, token } from "./bench/server.js";
 
 /**
  * @typedef {import("./bench/server.js").State} State
@@ -22,17 +22,40 @@ const beside = new Set(/beside=([\d,]+)/.exec(location.hash)?.[1].split(",").map
 let group = null;
 let shown = "";
 
-/** Answers may come out of turn: the one that was asked for last counts. */
-let turn = 0;
 let wanted = "";
+/** Steps begin and end while the state is on its way: the events know better. */
+let events = 0;
 
-async function refresh() {
-  const mine = ++turn;
+/** @type {Promise<void> | null} */
+let refreshing = null;
+let again = false;
+
+/** Asks for the state and draws it: one request at a time; whoever asks meanwhile gets the next one. */
+function refresh() {
+  again = true;
+  refreshing ??= (async () => {
+    try {
+      while (again) {
+        again = false;
+        await refreshOnce();
+      }
+    } finally {
+      refreshing = null;
+    }
+  })();
+  return refreshing;
+}
+
+async function refreshOnce() {
+  const before = events;
   const told = await ask("/api/state");
-  if (mine !== turn) return;
+  if (before !== events && state) {
+    told.work = state.work;
+    again = true;
+  }
   state = told;
   draw();
-  await records();
+  await Promise.all([records(), figures()]);
 }
 
 function draw() {
@@ -119,7 +142,7 @@ function drawModels(s) {
       current ? null : el("label", {}, el("input", { type: "checkbox", checked: beside.has(m.id), onchange: () => {
         if (!beside.delete(m.id)) beside.add(m.id);
         address();
-        void attempt(records);
+        void attempt(() => Promise.all([records(), figures()]));
       } }), "show beside"),
       under(m.id));
   };
@@ -142,12 +165,9 @@ function address() {
 
 /** @param {State} s */
 function drawModel(s) {
-  const { model, made } = s;
-  for (const id of ["stretch", "match", "where", "checks", "steps", "law", "model"]) section(id, model !== null);
+  const { model } = s;
+  for (const id of ["match", "where", "steps", "law", "model"]) section(id, model !== null);
   if (!model) return;
-  const figure = (/** @type {import("./bench/server.js").Figure} */ f) => picture(f.picture, { caption: f.caption });
-  section("stretch", model.stretch.length > 0);
-  place("stretch").replaceChildren(...model.stretch.map(figure));
   place("match").replaceChildren(
     ...(model.error ? [el("div", { class: "verdict warning" }, el("p", {}, model.error))] : []),
     picture(model.ladder_picture),
@@ -155,8 +175,9 @@ function drawModel(s) {
     table(model.columns, model.rows, (i) => i > 1),
     ...(s.models.length > 1 ? [
       el("h3", {}, "Every model, on the same records"),
-      table(["model", "FIT, %", "RMSE", "× noise"], s.models.map((m) => [
+      table(["model", "parameters", "FIT, %", "RMSE", "× noise"], s.models.map((m) => [
         `${m.id}. ${m.step}`,
+        m.parameters === null ? "–" : String(m.parameters),
         ...[m.fit_percent, m.rmse, m.rmse && m.noise_rmse && m.rmse / m.noise_rmse].map((v) => (v === null ? "–" : significant(v, 3))),
       ]), (i) => i > 0),
     ] : []),
@@ -165,21 +186,19 @@ function drawModel(s) {
     ...model.where.map((sentence) => el("p", {}, ...inline(sentence))),
     picture(model.where_picture, { group: "g1" }),
   );
-  section("checks", model.checks.length > 0);
-  place("checks").replaceChildren(
-    ...model.checks.map(figure),
-    ...(model.poles.length ? [el("div", {}, el("h3", {}, "Poles"), el("p", { class: "caption" }, model.poles_are),
-      table(model.pole_columns.slice(1), model.poles.map((row) => row.slice(1)), (i) => i > 0))] : []),
-  );
-  const interval = (/** @type {string} */ effect, /** @type {string} */ name) => {
-    const known = made?.parameters ?? {};
-    const p = known[name] ?? known[`${effect}.${name}`] ?? known[`${effect} ${name}`];
-    return p ? `${significant(p.low, 3)} … ${significant(p.high, 3)}` : "";
-  };
+  const known = s.intervals ?? {};
+  const interval = (/** @type {string} */ effect, /** @type {string} */ name) => known[`${effect}.${name}`] ?? known[`${effect} ${name}`] ?? known[name];
+  const some = model.parameters.some(([effect, name]) => interval(effect, name));
+  const value = (/** @type {string} */ number, /** @type {string} */ unit) => `${number}${unit ? ` ${unit}` : ""}`;
   place("model").replaceChildren(
     el("p", {}, model.describe),
-    ...(model.parameters.length ? [table(["parameter", "value", "95 % interval"],
-      model.parameters.map(([effect, name, value, unit]) => [`${effect}: ${name}`, `${value}${unit ? ` ${unit}` : ""}`, interval(effect, name)]), (i) => i > 0)] : []),
+    ...(model.parameters.length ? [table(["parameter of an effect", some ? "value (95 % interval)" : "value"],
+      model.parameters.map(([effect, name, number, unit]) => {
+        const p = interval(effect, name);
+        return [`${effect}: ${name}`, `${value(number, unit)}${p ? ` (${significant(p.low, 3)}\u00a0…\u00a0${significant(p.high, 3)})` : ""}`];
+      }), (i) => i > 0)] : []),
+    ...(model.base.length ? [table(["coefficient", "value"],
+      model.base.map(([name, lag, number, unit]) => [`${name}${lag ? ` (lag ${lag})` : ""}`, value(number, unit)]), (i) => i > 0)] : []),
   );
 }
 
@@ -218,7 +237,10 @@ function listPlots() {
 const RESULT = /** @type {Record<string, string>} */ ({ identify: "stretch", diagnose: "missing", discover: "discovery", extend: "stretch", design: "loop", import: "records" });
 
 /** @param {State} s @param {string} text @param {object | (() => unknown)} request @param {Record<string, any>=} attributes */
-const does = (s, text, request, attributes = {}) => button(text, () => (typeof request === "function" ? request() : run(request)), { disabled: s.work !== null, ...attributes });
+const does = (s, text, request, attributes = {}) => button(text, () => (typeof request === "function" ? request() : run(request)), steps(s, attributes));
+
+/** Attributes of a button that begins a step: it can be pressed while none runs, unless it is `off`. @param {State} s @param {Record<string, any>} attributes */
+const steps = (s, { off = false, ...attributes }) => ({ ...attributes, "data-step": off ? "off" : "on", disabled: off || s.work !== null });
 
 /** An answer as a card: verdict, evidence, confidence, notes. @param {import("./bench/server.js").Answer} answer */
 const verdict = ({ tone, verdict, evidence, confidence, notes }) =>
@@ -236,7 +258,7 @@ function drawDiagnosis(s) {
   const missing = found.missing.filter((effect) => !has.includes(effect));
   const row = (/** @type {string[]} */ cells) => [
     ...cells,
-    does(s, "Add", { command: "extend", model, options: { effect: cells[0] } }, { "aria-label": `add ${cells[0]}`, disabled: s.work !== null || has.includes(cells[0]) }),
+    does(s, "Add", { command: "extend", model, options: { effect: cells[0] } }, { "aria-label": `add ${cells[0]}`, off: has.includes(cells[0]) }),
   ];
   place("missing").replaceChildren(
     ...(missing.length ? [el("p", { class: "actions" }, does(s, `Add what is missing: ${missing.join(", ")}`, { command: "extend", model, options: { effect: missing } }, { class: "primary", id: "add-missing" }))] : []),
@@ -277,23 +299,27 @@ function drawDiscovery(s) {
 
 /** @param {State} s */
 function drawLaw(s) {
-  for (const b of document.querySelectorAll("#design button")) b.toggleAttribute("disabled", s.work !== null);
   const { law } = s;
   section("loop", law !== null);
   if (!law) return;
+  // The trials are many rows: they open when they are asked for, and stay as they are.
+  const open = /** @type {HTMLDetailsElement | null} */ (document.querySelector("#law details"))?.open ?? false;
   place("law").replaceChildren(
     picture(law.picture),
     ...law.words.split("\n").map((line) => el("p", {}, ...inline(line))),
     ...(law.margin ? [picture(law.margin)] : []),
-    el("h3", {}, "Every trial"),
-    el("p", { class: "caption" }, ...inline(law.caption)),
-    table(law.columns, law.rows, (i) => i > 2),
+    el("details", { open }, el("summary", {}, `Every trial (${law.rows.length})`),
+      el("p", { class: "caption" }, ...inline(law.caption)),
+      table(law.columns, law.rows, (i) => i > 2)),
   );
 }
 
 /** @param {State} s */
 function drawWork(s) {
-  for (const b of document.querySelectorAll("#identify button")) b.toggleAttribute("disabled", s.work !== null);
+  for (const b of document.querySelectorAll("#identify button, #design button, [data-step]")) {
+    b.toggleAttribute("disabled", s.work !== null || b.getAttribute("data-step") === "off");
+  }
+  editor.enable(s);
   place("work").hidden = s.work === null;
   clear();
   if (!s.work) {
@@ -302,9 +328,55 @@ function drawWork(s) {
     return;
   }
   place("work-name").textContent = s.work.name;
-  place("work-now").textContent = s.work.now;
+  place("work-now").textContent = said(s.work);
   progress(s.work.best);
   left(s.work);
+}
+
+/** The models that are shown, the current one last: at most six. @param {State} s */
+function shownModels(s) {
+  const existing = s.models.map((m) => m.id);
+  return [...[...beside].filter((id) => existing.includes(id) && id !== s.current), ...(s.current ? [s.current] : [])].slice(-6);
+}
+
+/** The figures that are drawn, and those that are asked for: models and data. */
+let drawn = "";
+let figuring = "";
+
+/** Brings the figures of the models that are shown: largest error, residual tests, poles. */
+async function figures() {
+  if (!state) return;
+  const models = shownModels(state);
+  const key = JSON.stringify([models, state.data?.hash]);
+  if (key === figuring) return;
+  figuring = key;
+  for (const id of ["stretch", "checks"]) {
+    section(id, models.length > 0);
+    if (key !== drawn) place(id).replaceChildren(el("p", { class: "muted" }, "Computing …"));
+  }
+  listPlots();
+  /** @type {import("./bench/server.js").Figures} */
+  let told = { stretch: [], checks: [], poles: [], pole_columns: [], poles_are: "" };
+  try {
+    if (models.length) told = await ask("/api/ask", { figures: models.join(",") });
+  } catch (error) {
+    if (figuring === key) figuring = "";
+    throw error;
+  }
+  if (key !== figuring) return;
+  drawn = key;
+  const figure = (/** @type {import("./bench/server.js").Figure} */ f) => picture(f.picture, { caption: f.caption });
+  section("stretch", told.stretch.length > 0);
+  place("stretch").replaceChildren(...told.stretch.map(figure));
+  // The first column is the model.
+  const from = models.length > 1 ? 0 : 1;
+  section("checks", told.checks.length > 0);
+  place("checks").replaceChildren(
+    ...told.checks.map(figure),
+    ...(told.poles.length ? [el("div", {}, el("h3", {}, "Poles"), el("p", { class: "caption" }, told.poles_are),
+      table(told.pole_columns.slice(from), told.poles.map((row) => row.slice(from)), (i) => i + from > 1))] : []),
+  );
+  listPlots();
 }
 
 /** Brings the curves of the current model, and of those beside it. */
@@ -314,8 +386,7 @@ async function records() {
     section("records", false);
     return;
   }
-  const existing = state.models.map((m) => m.id);
-  const models = [...[...beside].filter((id) => existing.includes(id) && id !== state?.current), ...(state.current ? [state.current] : [])].slice(-6);
+  const models = shownModels(state);
   const key = JSON.stringify([models, state.data.hash]);
   wanted = key;
   if (key === shown && group) {
@@ -332,7 +403,7 @@ async function records() {
   place("g1").replaceChildren();
   // Names begin with the model's number; of a search, the next one's.
   const ids = payload.runs.map((/** @type {string} */ name) => Number.parseInt(name, 10));
-  payload.colours = [...ids, Math.max(0, ...existing) + 1].map(colour);
+  payload.colours = [...ids, Math.max(0, ...(state?.models ?? []).map((m) => m.id)) + 1].map(colour);
   // A few pulses at first, not a solid block of them.
   const longest = Math.max(...payload.records.map((/** @type {{n: number, period: number}} */ r) => r.n * r.period));
   payload.view ??= [0, Math.min(longest, 2000 * state.data.period)];
@@ -358,41 +429,79 @@ async function glimpse() {
   }
 }
 
+/** A step begins: the page shows it at once. @param {string} name */
+function begins(name) {
+  events++;
+  if (!state) return;
+  state.work = { name, now: "", best: [], budget: 0, elapsed_s: 0, stage_s: 0 };
+  drawWork(state);
+  place("right").scrollTop = 0;
+}
+
+/** A step has ended. @param {string | null} error */
+function ends(error) {
+  events++;
+  const step = /^host-fit (\S+)/.exec(state?.work?.name ?? "")?.[1] ?? "";
+  if (state) {
+    state.work = null;
+    drawWork(state);
+  }
+  ended();
+  refresh().then(() => {
+    if (error) complain(error);
+    else document.getElementById(`${RESULT[step]}-section`)?.scrollIntoView();
+  }, complain);
+}
+
 function listen() {
-  const events = new EventSource(`/api/events?token=${token}`);
-  events.onopen = () => {
+  const source = new EventSource(`/api/events?token=${token}`);
+  source.onopen = () => {
     place("offline").hidden = true;
     void attempt(refresh);
   };
-  events.onerror = () => (place("offline").hidden = false);
-  events.onmessage = (message) => {
+  source.onerror = () => (place("offline").hidden = false);
+  source.onmessage = (message) => {
     const event = JSON.parse(message.data);
-    if (event.kind === "now" && state?.work) {
-      state.work.now = event.words;
-      place("work-now").textContent = event.words;
-      left(state.work);
-    } else if (event.kind === "best" && state?.work) {
-      const { best } = state.work;
-      // Fewer evaluations than before are another search's.
-      if (event.evaluations < (best.at(-1)?.[0] ?? 0)) best.length = 0;
-      best.push([event.evaluations, event.best]);
-      state.work.budget = event.budget;
-      left(state.work);
-      place("work-now").textContent = `${event.evaluations} evaluations, best ${significant(event.best)}`;
-      progress(best);
+    const work = state?.work;
+    if (event.kind === "begins") begins(event.name);
+    else if (event.kind === "ends") ends(event.error);
+    else if (event.kind === "warning") complain(event.words);
+    else if ((event.kind === "now" || event.kind === "best") && !work) {
+      // The page was opened during the step: the state that is on its way has all of it.
+      if (!refreshing) void refresh().catch(complain);
+    } else if (event.kind === "now" && work) {
+      if (event.stage) stage(work);
+      work.now = event.words;
+      place("work-now").textContent = said(work);
+      left(work);
+    } else if (event.kind === "best" && work) {
+      const last = work.best.at(-1);
+      // Fewer evaluations or a higher value than before are another search's.
+      if (last && (event.evaluations < last[0] || event.best > last[1])) stage(work);
+      work.best.push([event.evaluations, event.best]);
+      work.budget = event.budget;
+      left(work);
+      place("work-now").textContent = said(work);
+      progress(work.best);
       void glimpse().catch(() => {});
-    } else if (event.kind === "warning") {
-      complain(event.words);
-    } else if (event.kind === "ends") {
-      const step = /^host-fit (\S+)/.exec(state?.work?.name ?? "")?.[1] ?? "";
-      void refresh().then(() => {
-        if (event.error) complain(event.error);
-        else document.getElementById(`${RESULT[step]}-section`)?.scrollIntoView();
-      }, complain);
-    } else {
-      void refresh().catch(complain);
-    }
+    } else void refresh().catch(complain);
   };
+  // The time goes on where a step says nothing.
+  setInterval(() => {
+    if (state?.work) left(state.work);
+  }, 1000);
+}
+
+/** As in the style. */
+const narrow = matchMedia("(max-width: 900px)");
+
+/** The list of plots stays in view: in the middle pane, or above the only column. Headings keep clear of it. */
+function keepPlots() {
+  const plots = place("plots");
+  const put = () => (narrow.matches ? place("panes").before(plots) : place("middle").prepend(plots));
+  put();
+  narrow.addEventListener("change", put);
+  new ResizeObserver(() => place("middle").style.setProperty("--plots", `${plots.offsetHeight}px`)).observe(plots);
 }
 
 for (const [id, command] of [["identify", "identify"], ["design", "design"]]) {
@@ -405,6 +514,7 @@ for (const [id, command] of [["identify", "identify"], ["design", "design"]]) {
 }
 place("cancel").addEventListener("click", () => attempt(() => ask("/api/cancel", {})));
 grips();
+keepPlots();
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => group?.restyle());
 importer.listen();
 editor.listen(refresh);

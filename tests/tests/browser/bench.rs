@@ -75,6 +75,11 @@ fn the_workbench_finds_what_is_missing_and_loses_nothing() {
     let second = other.open_dark(&served.address, SIZE);
 
     page.click("#diagnose");
+    // The step is shown at once, and no second one can begin.
+    page.until(
+        3,
+        "!document.getElementById('work').hidden && ['diagnose', 'discover', 'own-keep'].every(id => document.getElementById(id).disabled)",
+    );
     let candidates = "document.querySelectorAll('#missing tbody tr').length > 2";
     page.until(
         900,
@@ -91,6 +96,8 @@ fn the_workbench_finds_what_is_missing_and_loses_nothing() {
     page.idles_with(900, 3);
     steps.done("added");
     second.until(20, &format!("{CURRENT} === '3. + plenum-droop'"));
+    // Charts name the models as the tree does, in the colours of the tree: the third is green.
+    page.until(20, "['1. identified', '3. + plenum-droop'].every(name => document.querySelector('#stretch figure')?.textContent.includes(name)) && document.querySelector('#stretch svg [stroke=\"#009E73\"]') !== null && document.querySelector('#checks svg [stroke=\"#009E73\"]') !== null");
     let times_noise = page.times_noise();
     assert!(times_noise < 1.05, "{times_noise}");
     page.scroll_to("#match-section");

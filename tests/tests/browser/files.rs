@@ -157,7 +157,7 @@ fn an_own_effect_is_mended_under_the_cursor_and_a_law_designed() {
     page.act(&write(DROOP));
     page.says(5, "#own-told", "line 4, column 36");
     page.click("#own-keep");
-    page.says(5, "#message", "sgged is not known here");
+    page.says(5, "#message", "sgged is not defined here");
     let cursor = page.act("(() => { const a = document.getElementById('own-text'); return a.value.slice(a.selectionStart, a.selectionStart + 5); })()");
     assert_eq!(cursor, "sgged");
     page.shoot("workbench-own-effect.png");

@@ -7,12 +7,16 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use host_fit::data::Use;
 use host_fit::indicators::{ErrorKind, score};
-use host_fit::model::Model;
-use host_fit::picture::{Ladder, LadderStep, Picture, ladder, packed, significant, workbench_page};
+use host_fit::model::{Delay, Model};
+use host_fit::picture::{
+    Ladder, LadderStep, Picture, ladder, packed, significant, time, workbench_page,
+};
 use host_fit::steps::{self, Comparison, ImportedSet};
+use model_core::effect::Parameter;
 use serde_json::{Value, json};
 use workbench::{Bench, Download, Node, Project, Refusal, Work, beneath};
 
+use super::colours;
 use super::data::{Data, Uploads};
 use super::own::OwnEffects;
 use super::request::Line;
@@ -34,6 +38,12 @@ pub(super) struct ModelBench {
     data: Mutex<Option<Arc<Data>>>,
     /// Free runs and failures by model.
     compared: Mutex<HashMap<u32, Arc<Compared>>>,
+    /// What the page shows of a model, by hash of the data set and model.
+    described: Mutex<HashMap<(String, u32), Value>>,
+    /// Figures of models shown beside each other, by hash of the data set and models.
+    figures: Mutex<HashMap<(String, Vec<u32>), Value>>,
+    /// Number of parameters by model.
+    counts: Mutex<HashMap<u32, usize>>,
     /// The free run of the best model of a running search: number of evaluations, and y per record.
     best: Mutex<Option<(usize, Vec<Vec<f64>>)>>,
     /// Whether a step runs. The data set is not exchanged meanwhile.
@@ -85,6 +95,9 @@ impl ModelBench {
             own: OwnEffects::of(folder),
             data: Mutex::new(data.map(Arc::new)),
             compared: Mutex::default(),
+            described: Mutex::default(),
+            figures: Mutex::default(),
+            counts: Mutex::default(),
             best: Mutex::default(),
             busy: AtomicBool::new(false),
         })
@@ -145,6 +158,9 @@ impl ModelBench {
         let hash = load(&incoming)?.set.hash;
         let earlier = lock(&self.project).start_anew(&hash)?;
         lock(&self.compared).clear();
+        lock(&self.described).clear();
+        lock(&self.figures).clear();
+        lock(&self.counts).clear();
         let folder = beneath(&self.folder, Path::new(super::IMPORTED))?;
         match earlier {
             Some(earlier) if folder.exists() => {
@@ -329,14 +345,24 @@ impl ModelBench {
         })
     }
 
+    /// Hash of the data set; empty without one.
+    fn data_hash(&self) -> String {
+        let data = self.data();
+        data.map(|data| data.set.hash.clone()).unwrap_or_default()
+    }
+
+    /// What the page shows of a model without its figures.
     fn model_state(&self, id: u32) -> Value {
+        let key = (self.data_hash(), id);
+        if let Some(known) = lock(&self.described).get(&key) {
+            return known.clone();
+        }
         let compared = match self.compared(id) {
             Ok(compared) => compared,
             Err(why) => {
                 return json!({
                     "describe": "", "effects": [], "columns": [], "rows": [], "where": [], "where_picture": "",
-                    "ladder_picture": self.ladder(id).html(), "error": why.0, "stretch": [], "checks": [],
-                    "poles": [], "parameters": [],
+                    "ladder_picture": self.ladder(id).html(), "error": why.0, "parameters": [], "base": [],
                 });
             }
         };
@@ -349,47 +375,9 @@ impl ModelBench {
             ),
             Err(why) => (Vec::new(), Vec::new(), String::new(), Some(why)),
         };
-        let records = self
-            .data()
-            .map(|data| compared.model.targets(&data.set.records));
-        let records = records.unwrap_or_default();
-        let runs = compared.run.as_ref().map_or(&[][..], |run| &run.runs);
-        let (label, model) = ("model", &compared.model);
-        let tested = [Run { label, model, runs }];
-        let drawn = |(picture, caption): (Picture, String)| json!({"picture": picture.html(), "caption": caption});
-        let checks: Vec<Value> = match compared.run {
-            Ok(_) => check_figures(&records, &tested)
-                .into_iter()
-                .chain(frequency_figures(&records, &tested))
-                .map(drawn)
-                .collect(),
-            Err(_) => Vec::new(),
-        };
-        // A model is shown beside the model that it was made from, if both exist.
-        let parent = lock(&self.project)
-            .node(id)
-            .ok()
-            .and_then(|node| node.parent);
-        let before = parent.and_then(|parent| self.compared(parent).ok());
-        let before = before.as_ref().and_then(|before| before.run.as_ref().ok());
-        let mut shown: Vec<(&str, &[Vec<f64>])> = Vec::new();
-        shown.extend(before.map(|before| ("before", before.runs.as_slice())));
-        shown.push((if before.is_some() { "after" } else { "model" }, runs));
-        let worst = shown
-            .first()
-            .and_then(|first| worst_stretch(&records, first.1));
-        let stretch: Vec<Value> = worst
-            .and_then(|worst| stretch_figure(&records, &shown, worst))
-            .into_iter()
-            .map(drawn)
-            .collect();
-        json!({
-            "stretch": stretch,
-            "checks": checks,
-            "poles": pole_rows(&tested),
-            "pole_columns": POLES.map(|(name, _)| name),
-            "poles_are": POLES_ARE,
-            "parameters": parameters(&compared.model),
+        let state = json!({
+            "parameters": effect_parameters(&compared.model),
+            "base": base_parameters(&compared.model),
             "describe": describe(&compared.model),
             "effects": compared.model.effect_names(),
             "columns": ["record", "use", "FIT, %", "ρ", "RMSE", "noise", "ε", "inside"],
@@ -398,22 +386,230 @@ impl ModelBench {
             "where_picture": picture,
             "ladder_picture": self.ladder(id).html(),
             "error": error,
-        })
+        });
+        lock(&self.described).insert(key, state.clone());
+        state
+    }
+
+    /// Confidence intervals of the parameters of a model's effects, from the step that fitted them: of the model
+    /// itself, or of the one that it was made from by a step that left the parameters unchanged.
+    fn intervals(&self, id: u32) -> Option<Value> {
+        let values = |id: u32| Some(self.compared(id).ok()?.model.values());
+        let own = values(id)?;
+        let mut at = Some(id);
+        while let Some(model) = at.filter(|model| values(*model).as_ref() == Some(&own)) {
+            let mut made = self.kept("made", Some(model));
+            if let Some(parameters) = made.get_mut("parameters") {
+                return Some(parameters.take());
+            }
+            at = lock(&self.project).node(model).ok()?.parent;
+        }
+        None
+    }
+
+    /// Number of parameters of a model.
+    fn parameter_count(&self, id: u32) -> Option<usize> {
+        if let Some(known) = lock(&self.counts).get(&id) {
+            return Some(*known);
+        }
+        let model = Model::load(&self.path(id).ok()?).ok()?;
+        let count = model.values().iter().filter(|value| **value != 0.0).count();
+        lock(&self.counts).insert(id, count);
+        Some(count)
+    }
+
+    /// Every model of the project, with its number of parameters.
+    fn models(&self, nodes: &[Node]) -> Vec<Value> {
+        let each = nodes.iter().map(|node| {
+            let mut told = json!(node);
+            if let Some(told) = told.as_object_mut() {
+                told.insert(
+                    "parameters".to_owned(),
+                    self.parameter_count(node.id).into(),
+                );
+            }
+            told
+        });
+        each.collect()
+    }
+
+    /// Name of a model on the page.
+    fn label(&self, id: u32) -> Result<String, Refusal> {
+        Ok(format!("{id}. {}", lock(&self.project).node(id)?.step))
+    }
+
+    /// Largest error, residual tests, step response, poles and frequency response of the models in `list` (numbers
+    /// with commas between them, the current one last). The largest error is also shown for the model that the
+    /// current one was made from.
+    fn figures(&self, list: &str) -> Result<Value, Refusal> {
+        let wrong = |_| Refusal("models are numbers: 1,3".to_owned());
+        let numbers = list.split(',').filter(|number| !number.is_empty());
+        let ids: Vec<u32> = numbers
+            .map(str::parse)
+            .collect::<Result<_, _>>()
+            .map_err(wrong)?;
+        if ids.len() > MOST_FIGURES {
+            let why = format!("at most {MOST_FIGURES} models are shown at once");
+            return Err(Refusal(why));
+        }
+        let key = (self.data_hash(), ids);
+        if let Some(known) = lock(&self.figures).get(&key) {
+            return Ok(known.clone());
+        }
+        let found = self.figures_of(&key.1)?;
+        let mut figures = lock(&self.figures);
+        if figures.len() >= KEPT_FIGURES {
+            figures.clear();
+        }
+        figures.insert(key, found.clone());
+        Ok(found)
+    }
+
+    fn figures_of(&self, ids: &[u32]) -> Result<Value, Refusal> {
+        let Some(current) = ids.last() else {
+            return Ok(json!({"stretch": [], "checks": [], "poles": []}));
+        };
+        let parent = lock(&self.project).node(*current)?.parent;
+        let parent = parent.filter(|parent| !ids.contains(parent));
+        let all = parent.iter().chain(ids);
+        let shown: Vec<(u32, String, Arc<Compared>)> = all
+            .map(|id| Ok((*id, self.label(*id)?, self.compared(*id)?)))
+            .collect::<Result<_, Refusal>>()?;
+        let records = match shown.last() {
+            Some((_, _, last)) => last.model.targets(&self.data()?.set.records),
+            None => Vec::new(),
+        };
+        let runs: Vec<(u32, Run<'_>)> = shown
+            .iter()
+            .filter_map(|(id, label, compared)| {
+                let run = Run {
+                    label,
+                    model: &compared.model,
+                    runs: &compared.run.as_ref().ok()?.runs,
+                    colour: Some(colours::index(*id)),
+                };
+                Some((*id, run))
+            })
+            .collect();
+        let drawn = |(picture, caption): (Picture, String)| json!({"picture": picture.html(), "caption": caption});
+        let pairs: Vec<(&str, &[Vec<f64>])> =
+            runs.iter().map(|(_, run)| (run.label, run.runs)).collect();
+        let own: Vec<&str> = runs.iter().map(|(id, _)| colours::of(*id)).collect();
+        // The interval in which the earliest of the models has its largest error.
+        let worst = pairs
+            .first()
+            .and_then(|first| worst_stretch(&records, first.1));
+        let stretch = worst.and_then(|worst| stretch_figure(&records, &pairs, worst));
+        let stretch = stretch.map(|(picture, caption)| {
+            json!({"picture": colours::recoloured(&picture.html(), &own), "caption": caption})
+        });
+        let tested: Vec<Run<'_>> = runs
+            .into_iter()
+            .filter(|(id, _)| ids.contains(id))
+            .map(|(_, run)| run)
+            .collect();
+        let checks: Vec<Value> = match tested.is_empty() {
+            true => Vec::new(),
+            false => check_figures(&records, &tested)
+                .into_iter()
+                .chain(frequency_figures(&records, &tested))
+                .map(drawn)
+                .collect(),
+        };
+        Ok(json!({
+            "stretch": stretch.into_iter().collect::<Vec<_>>(),
+            "checks": checks,
+            "poles": pole_rows(&tested),
+            "pole_columns": POLES.map(|(name, _)| name),
+            "poles_are": POLES_ARE,
+        }))
+    }
+
+    /// The stored trials of the law of a model, with the law in the model's colour.
+    fn law(&self, id: Option<u32>) -> Value {
+        let mut law = self.kept("law", id);
+        if let (Some(id), Some(picture)) = (id, law.get_mut("picture"))
+            && let Some(html) = picture.as_str()
+        {
+            // The first series is the relay.
+            *picture = colours::recoloured(html, &[colours::NO_MODEL, colours::of(id)]).into();
+        }
+        law
+    }
+}
+
+/// Largest number of models in the figures.
+const MOST_FIGURES: usize = 6;
+/// Number of sets of figures that are stored.
+const KEPT_FIGURES: usize = 24;
+
+/// Coefficients and delays of a model without effects: name, lag, value, unit.
+fn base_parameters(model: &Model) -> Vec<[String; 4]> {
+    let row = |name: String, lag: String, value: f64, unit: &str| {
+        [name, lag, significant(value, 4), unit.to_owned()]
+    };
+    let samples = |lag: u16| match lag {
+        1 => "sample",
+        _ => "samples",
+    };
+    let long = |lag: u16| time(f64::from(lag) * model.sample_period_s, 3);
+    let lag_of = |lag: u16| format!("{lag} {}, {}", samples(lag), long(lag));
+    let mut rows = Vec::new();
+    match &model.delay {
+        Delay::Fixed { delays } => {
+            for (input, delay) in (1..).zip(delays) {
+                let name = format!("delay of input {input}");
+                let unit = format!("{}, {}", samples(*delay), long(*delay));
+                rows.push(row(name, String::new(), f64::from(*delay), &unit));
+            }
+        }
+        Delay::Law(law) => {
+            for (parameter, value) in law.spec.parameters.iter().zip(&law.parameters) {
+                let name = format!("{}: {}", law.spec.name, parameter.name);
+                rows.push(row(name, String::new(), *value, unit(parameter)));
+            }
+            let factors = (1..).zip(&law.factors);
+            for (input, factor) in factors.filter(|_| law.factors.len() > 1) {
+                let name = format!("delay of input {input} / delay");
+                rows.push(row(name, String::new(), *factor, ""));
+            }
+        }
+    }
+    if model.constant != 0.0 {
+        rows.push(row("d".to_owned(), String::new(), model.constant, ""));
+    }
+    let lags = model.state_lags.iter().zip(&model.a);
+    for (i, (lag, value)) in (1..).zip(lags) {
+        rows.push(row(format!("a{i}"), lag_of(*lag), *value, ""));
+    }
+    for (l, value) in (1..).zip(&model.b) {
+        rows.push(row(format!("b{l}"), String::new(), *value, ""));
+    }
+    let lags = model.product_lags.iter().zip(1..);
+    let each = (1..=model.inputs()).flat_map(|l| lags.clone().map(move |(lag, j)| (lag, j, l)));
+    for ((lag, j, l), value) in each.zip(&model.c) {
+        rows.push(row(format!("c{j}{l}"), lag_of(*lag), *value, ""));
+    }
+    rows
+}
+
+/// Unit of a parameter; empty for a ratio.
+fn unit(parameter: &Parameter) -> &'static str {
+    match parameter.unit.symbol() {
+        "-" => "",
+        unit => unit,
     }
 }
 
 /// Parameters of the effects of a model: effect, name, value, unit.
-fn parameters(model: &Model) -> Vec<[String; 4]> {
+fn effect_parameters(model: &Model) -> Vec<[String; 4]> {
     let effects = model.effects.iter();
     let known = effects.filter_map(|added| Some((added, model.spec(&added.name)?)));
     let each = known.flat_map(|(added, spec)| {
         let pairs = spec.parameters.iter().zip(&added.parameters);
         pairs.map(|(parameter, value)| {
-            let unit = match parameter.unit.symbol() {
-                "-" => String::new(),
-                unit => unit.to_owned(),
-            };
             let name = parameter.name.to_owned();
+            let unit = unit(parameter).to_owned();
             [added.name.clone(), name, significant(*value, 3), unit]
         })
     });
@@ -434,15 +630,16 @@ impl Bench for ModelBench {
             "data": self.data().ok().map(|data| data.state()),
             "project": self.folder.display().to_string(),
             "current": current,
-            "models": models,
+            "models": self.models(&models),
             "log": log,
             "uploads": self.uploads.names(),
             "own": self.own.state(),
             "model": current.map(|id| self.model_state(id)),
             "diagnosis": self.kept("diagnosis", current),
             "discovery": self.kept("discovery", current),
-            "law": self.kept("law", current),
+            "law": self.law(current),
             "made": self.kept("made", current),
+            "intervals": current.and_then(|id| self.intervals(id)),
         })
     }
 
@@ -450,10 +647,7 @@ impl Bench for ModelBench {
         let data = self.data()?;
         let compared: Vec<(String, Arc<Compared>)> = models
             .iter()
-            .map(|id| {
-                let step = lock(&self.project).node(*id)?.step.clone();
-                Ok((format!("{id}. {step}"), self.compared(*id)?))
-            })
+            .map(|id| Ok((self.label(*id)?, self.compared(*id)?)))
             .collect::<Result<_, Refusal>>()?;
         let runs: Vec<(&str, &[Vec<f64>])> = compared
             .iter()
@@ -487,11 +681,12 @@ impl Bench for ModelBench {
             Some(("keep", text)) => self.own.keep(text),
             Some(("forget", name)) => self.own.forget(name),
             Some(("inspect", file)) => self.uploads.inspect(file),
+            Some(("figures", models)) => self.figures(models),
             Some(("best", seen)) => Ok(self.best_since(seen)),
             Some(("bundled", _)) => self.idle().and_then(|()| self.bring_bundled()),
             Some(("validate", names)) => self.idle().and_then(|()| self.validate_on(names)),
             _ => Err(Refusal(
-                "the key must be one of `check`, `keep`, `forget`, `inspect`, `best`, `bundled` and `validate`, with a text"
+                "the key must be one of `check`, `keep`, `forget`, `inspect`, `figures`, `best`, `bundled` and `validate`, with a text"
                     .to_owned(),
             )),
         }

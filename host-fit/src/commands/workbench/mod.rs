@@ -1,6 +1,7 @@
 //! `host-fit workbench`: the complete workflow on a local page.
 
 mod bench;
+mod colours;
 mod data;
 mod own;
 mod request;

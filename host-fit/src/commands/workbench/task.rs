@@ -71,7 +71,7 @@ impl<'a> Page<'a> {
 
 impl Onlooker for Page<'_> {
     fn begins(&self, what: &str) {
-        self.work.now(what);
+        self.work.begins(what);
     }
     fn now(&self, what: &str) {
         self.work.now(what);
@@ -188,6 +188,14 @@ impl ModelBench {
     }
 }
 
+/// A message about the reference of a law, with the option that sets it; the page replaces options by the labels of
+/// its fields.
+fn of_the_field(message: &str) -> String {
+    message
+        .replace("the reference", "--target")
+        .replace("choose a reference inside", "choose a level inside")
+}
+
 /// Path of the closed loop's CSV, next to the model with the law.
 fn loop_of(model: &Path) -> PathBuf {
     let stem = model.file_stem().unwrap_or_default().to_string_lossy();
@@ -243,7 +251,8 @@ impl Task {
             Asked::Design(args) => {
                 page.begins("designing, and trying the law in the loop");
                 let (model, data) = (self.model(bench)?, bench.data()?);
-                let tried = args.tried(&model, Some(&data.set)).map_err(told)?;
+                let tried = args.tried(&model, Some(&data.set)).map_err(told);
+                let tried = tried.map_err(|why| Refusal(of_the_field(&why.0)))?;
                 let refused = tried.refused("the box “keep the law even if attachment is lost”");
                 if let Some(refused) = refused.filter(|_| !args.force()) {
                     return Err(Refusal(refused));
@@ -398,5 +407,25 @@ impl Task {
             leaves: None,
         })?;
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use model_core::control::{Reachable, Unreachable};
+
+    #[test]
+    fn a_level_that_cannot_be_held_names_its_field() {
+        let error = Unreachable {
+            reference: 99.0,
+            reachable: Reachable {
+                low: 0.0,
+                high: 0.8,
+            },
+        };
+        let told = of_the_field(&error.to_string());
+        assert!(told.starts_with("--target 99 cannot be held"), "{told}");
+        assert!(told.ends_with("choose a level inside"), "{told}");
     }
 }

@@ -75,6 +75,11 @@ export function drawOwn(s, refresh) {
       button("forget", () => attempt(async () => { await ask("/api/ask", { forget: own.name }); await refresh(); }), { "aria-label": `forget ${own.name}` }),
     ]),
   );
+  enable(s);
+}
+
+/** @param {import("./server.js").State} s */
+export function enable(s) {
   for (const name of ["own-keep", "own-add"]) place(name).toggleAttribute("disabled", s.work !== null || (name === "own-add" && model === null));
 }
 

@@ -1,11 +1,12 @@
 // What the page asks of the server.
 
 /**
- * @typedef {{id: number, parent: number | null, step: string, command: string, rmse: number | null, noise_rmse: number | null, fit_percent: number | null}} Model
+ * @typedef {{id: number, parent: number | null, step: string, command: string, rmse: number | null, noise_rmse: number | null, fit_percent: number | null, parameters: number | null}} Model
  * @typedef {{effect: string, error_reduction_percent: number, p_value: number, significant: boolean, refitted: boolean, parameters: Record<string, {value: number, unit: string, low: number, high: number}>, confounded_with: string[]}} Candidate
  * @typedef {{tone: string, verdict: string, evidence: string, confidence: string, next: string, notes: string[]}} Answer
  * @typedef {{answer: Answer, rows: string[][], missing: string[], ranking: Candidate[], picture: string, experiment: {description: string, separation_sigmas: number, effects: string[]} | null, experiment_picture: string | null}} Diagnosis
  * @typedef {{picture: string, caption: string}} Figure
+ * @typedef {{stretch: Figure[], checks: Figure[], poles: string[][], pole_columns: string[], poles_are: string}} Figures
  * @typedef {{effect: string, title: string, formula: string, is_formula: boolean, picture: string, file: string}} Term
  * @typedef {object} State
  * @property {{title: string, path: string, hash: string, period: number, records: {name: string, use: string, samples: number}[], remarks: string[]} | null} data
@@ -15,12 +16,13 @@
  * @property {string[]} log
  * @property {string[]} uploads
  * @property {{name: string, text: string}[]} own
- * @property {{describe: string, effects: string[], columns: string[], rows: string[][], where: string[], where_picture: string, ladder_picture: string, error: string | null, stretch: Figure[], checks: Figure[], poles: string[][], pole_columns: string[], poles_are: string, parameters: string[][]} | null} model
- * @property {{answer: Answer, parameters?: Record<string, {value: number, unit: string, low: number, high: number}>} | null} made
+ * @property {{describe: string, effects: string[], columns: string[], rows: string[][], where: string[], where_picture: string, ladder_picture: string, error: string | null, parameters: string[][], base: string[][]} | null} model
+ * @property {{answer: Answer} | null} made
+ * @property {Record<string, {value: number, unit: string, low: number, high: number}> | null} intervals
  * @property {Diagnosis | null} diagnosis
  * @property {{answer: Answer, terms: Term[]} | null} discovery
  * @property {{answer: Answer, words: string, picture: string, margin: string | null, columns: string[], rows: string[][], caption: string} | null} law
- * @property {{name: string, now: string, best: [number, number][], budget: number, elapsed_s: number} | null} work
+ * @property {{name: string, now: string, best: [number, number][], budget: number, elapsed_s: number, stage_s: number} | null} work
  */
 
 import { el, inline, place } from "./dom.js";
@@ -74,10 +76,16 @@ function worded(text) {
 /** @param {unknown} error */
 export function complain(error) {
   if (error instanceof Gone) return;
-  const told = el("div", { class: "verdict warning", role: "alert" },
+  const why = error instanceof Error ? error.message : String(error);
+  const told = el("div", { class: `verdict warning${/^a task is running/.test(why) ? " busy" : ""}`, role: "alert" },
     el("button", { type: "button", class: "close", "aria-label": "close this message", onclick: () => told.remove() }, "×"),
-    el("p", {}, ...inline(worded(error instanceof Error ? error.message : String(error)))));
+    el("p", {}, ...inline(worded(why))));
   place("message").append(told);
+}
+
+/** Messages that a step is running no longer hold. */
+export function ended() {
+  for (const told of document.querySelectorAll("#message .busy")) told.remove();
 }
 
 /** Does something that may be refused. @param {() => Promise<unknown>} does */

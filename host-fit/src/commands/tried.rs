@@ -164,7 +164,11 @@ impl Tried {
         let mut text = if lost.is_empty() && decide == 1 {
             "attachment is kept in the trial on the model; no other trial decides".to_owned()
         } else if lost.is_empty() {
-            format!("attachment is kept in all {decide} trials on {plants}")
+            let all = match decide {
+                2 => "both".to_owned(),
+                _ => format!("all {decide}"),
+            };
+            format!("attachment is kept in {all} trials on {plants}")
         } else {
             format!(
                 "attachment is lost in {} of {decide} trials on {plants}: {}",

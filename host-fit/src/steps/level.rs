@@ -174,8 +174,8 @@ pub(super) fn ranked(models: &[NamedComparison], finished: impl Fn(&str) -> Stri
         })
 }
 
-/// The difference of the errors of two models, paired over the records with this use, with its 95 % interval (Student's
-/// t).
+/// The ratio of the errors of two models, paired over the records with this use: its geometric mean with the 95 % interval
+/// (Student's t of the logarithms). The ratio is used because the errors of all models are larger on livelier records.
 fn paired(best: &NamedComparison, second: &NamedComparison, role: Use) -> String {
     let records = |of: &NamedComparison| -> Vec<f64> {
         let all = of.comparison.scores.records.iter();
@@ -184,15 +184,22 @@ fn paired(best: &NamedComparison, second: &NamedComparison, role: Use) -> String
             .collect()
     };
     let (own, other) = (records(best), records(second));
-    let differences: Vec<f64> = own.iter().zip(&other).map(|(a, b)| b - a).collect();
+    let ratios = own
+        .iter()
+        .zip(&other)
+        .map(|(own, other)| (other / own).ln());
+    let logarithms: Vec<f64> = ratios.collect();
     let kind = ErrorKind::of(role).records();
-    let count = differences.len();
+    let count = logarithms.len();
     let n = count as f64;
+    if count < 2 {
+        return "One record alone gives no interval of the difference.".to_owned();
+    }
+    let mean = logarithms.iter().sum::<f64>() / n;
+    let variance = logarithms.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (n - 1.0);
     let Ok(students) = StudentsT::new(0.0, 1.0, n - 1.0) else {
-        return format!("One of the {kind} alone gives no interval of the difference.");
+        return String::new();
     };
-    let mean = differences.iter().sum::<f64>() / n;
-    let variance = differences.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (n - 1.0);
     let half = students.inverse_cdf(0.975) * (variance / n).sqrt();
     if !half.is_finite() {
         return String::new();
@@ -202,10 +209,11 @@ fn paired(best: &NamedComparison, second: &NamedComparison, role: Use) -> String
         false => "the two models are not distinguishable on these records",
     };
     format!(
-        "The RMSE of {} is higher by {} (95 % interval {} … {}, paired over {count} {kind}): {verdict}.",
+        "The RMSE of {} is {} times that of {} (mean over {count} {kind}, paired; 95 % interval {} … {}): {verdict}.",
         second.model,
-        significant(mean, 3),
-        significant(mean - half, 3),
-        significant(mean + half, 3)
+        times(mean.exp()),
+        best.model,
+        times((mean - half).exp()),
+        times((mean + half).exp())
     )
 }

@@ -175,10 +175,9 @@ fn outcome_alone(r: &Ranked, diagnosis: &Diagnosis, plant: Plant) -> String {
     }
     match diagnosis.missing.as_slice() {
         [] => "significant, but explains too little".to_owned(),
-        named => {
-            let named = named.iter().map(|name| effect_in_words(name, plant));
-            format!("imitates {}", named.collect::<Vec<_>>().join(" and "))
-        }
+        named if plant == Plant::Flow => format!("imitates {}", named.join(" and ")),
+        [_] => "imitates the named behaviour".to_owned(),
+        _ => "imitates the named behaviours".to_owned(),
     }
 }
 

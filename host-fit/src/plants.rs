@@ -17,6 +17,7 @@ use firmware_sim::plant::{
 };
 use host_fit::design::{CaseGroup, DesignError, RULES, Trial, steady, time_constants};
 use host_fit::model::{Added, Delay, Model, TransportLaw};
+use host_fit::picture::significant;
 use host_fit::steps::units_of_order_one;
 use host_fit::terms::Units;
 use model_core::effect::Unit;
@@ -230,11 +231,18 @@ fn others(plant: &PlantSpec, seed: u64, units: Units) -> anyhow::Result<Vec<Tria
             .iter()
             // In the model's units.
             .map(|p| {
-                let value = units.value_out(Unit::of(p.unit), p.value);
-                format!("{} {value:.3}", p.name)
+                let unit = Unit::of(p.unit);
+                let value = significant(units.value_out(unit, p.value), 3);
+                match unit {
+                    Unit::None => format!("{} {value}", p.name),
+                    unit => format!("{} {value} {unit}", p.name),
+                }
             })
             .collect();
-        let name = format!("{name} ({})", values.join(", "));
+        let name = match values.as_slice() {
+            [] => (*name).to_owned(),
+            values => format!("{name} ({})", values.join(", ")),
+        };
         others.push(trial(CaseGroup::Effect, &name, &with, usual)?);
     }
     let delayed = |factor: f64| BasePlant {
@@ -263,10 +271,10 @@ fn others(plant: &PlantSpec, seed: u64, units: Units) -> anyhow::Result<Vec<Tria
     };
     for (name, base, under) in [
         ("delay +20 %", delayed(1.2), usual),
-        ("delay -20 %", delayed(0.8), usual),
+        ("delay −20 %", delayed(0.8), usual),
         ("gain +10 %", stronger(1.1), usual),
-        ("gain -10 %", stronger(0.9), usual),
-        ("noise x 3", plant.base, noisier),
+        ("gain −10 %", stronger(0.9), usual),
+        ("noise × 3", plant.base, noisier),
         ("every fifth reading lost", plant.base, losing(0.2, None)),
         (gap.as_str(), plant.base, losing(0.0, Some((from, length)))),
     ] {

@@ -177,6 +177,7 @@ fn several_models_are_compared_side_by_side() {
         text.contains("table-2-fixed ") && text.contains("RMSE / noise"),
         "{text}"
     );
+    contains_all(&text, &["Confidence:", "Next:       host-fit diagnose "]);
     let page = std::fs::read_to_string(page).expect("a page");
     assert!(page.contains("table-2-state-dependent"));
 }
@@ -325,9 +326,11 @@ fn the_printed_commands_lead_from_a_diagnosis_to_code() {
     let (by_diagnosis, _) = followed(&format!("host-fit compare by.toml {ramp}"));
     assert!(error(&extended["after"]) < 1.01 * error(&by_diagnosis["validate"]));
     assert!(error(&extended["after"]) < error(&extended["before"]));
-    let (compared, next) = followed(&next);
+    // The extended model is at the noise level, so its command and that of its comparison are the design of a law.
+    let (compared, compared_next) = followed(&format!("host-fit compare better.toml {ramp}"));
     assert_eq!(compared["validate"]["rmse"], extended["after"]["rmse"]);
     assert!(next.contains(" --target "), "{next}");
+    assert_eq!(compared_next, next);
     let (designed, next) = followed(&next);
     let kept = |case: &Value| case["kept"] == true;
     assert!(kept(&designed["cases"][0]) && kept(&designed["cases"][1]));

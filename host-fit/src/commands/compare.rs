@@ -53,7 +53,15 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
     }
     let models: Vec<(String, &Model)> = labels(&args.models).into_iter().zip(&loaded).collect();
     let found = steps::compare_several(&models, &set);
-    let found = found.map_err(|(name, error)| anyhow::Error::new(error).context(name))?;
+    let mut found = found.map_err(|(name, error)| anyhow::Error::new(error).context(name))?;
+    let best = found.best().map(|best| best.model.clone());
+    let best = models
+        .iter()
+        .position(|(name, _)| Some(name) == best.as_ref());
+    if let Some(path) = best.and_then(|index| args.models.get(index)) {
+        let answer = std::mem::take(&mut found.answer);
+        found.answer = answer.with_files(&shell_word(path), &shell_word(&args.dataset));
+    }
     let runs = found.models.iter();
     let runs: Vec<(&str, &[Vec<f64>])> = runs
         .map(|named| (named.model.as_str(), named.comparison.runs.as_slice()))

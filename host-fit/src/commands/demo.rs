@@ -15,9 +15,9 @@ use host_fit::discover;
 use host_fit::indicators::Indicators;
 use host_fit::model::{Delay, Model};
 use host_fit::output::{Staging, write_atomic};
-use host_fit::picture::{Column, Report};
+use host_fit::picture::{Column, Report, significant};
 use host_fit::steps::{
-    self, Answer, DelayKind, Design, DesignOutcome, DesignRequest, IdentifyRequest,
+    self, Answer, DelayKind, Design, DesignOutcome, DesignRequest, IdentifyRequest, Tone,
 };
 use model_core::control::HoldTimes;
 
@@ -25,9 +25,10 @@ use super::Console;
 use super::drawings::{LoopPicture, ladder_picture, loop_picture};
 use super::load::shell_word;
 use super::page::{
-    command_line, discovery_details, discovery_lead, finding_details, finding_lead, lead,
-    provenance, report_runs, report_scores,
+    command_line, discovery_details, discovery_lead, errors_of_models, finding_details,
+    finding_lead, lead, provenance, report_runs, report_scores,
 };
+use super::page_parts::card;
 use super::words::aligned;
 
 /// Run the whole workflow on bundled data: identify, compare, diagnose, extend, discover, generate constants, close
@@ -133,7 +134,11 @@ pub(crate) fn run(args: &Args, console: Console) -> anyhow::Result<()> {
     write_atomic(&out.join("identified.rs"), |file| {
         file.write_all(constants.text.as_bytes())
     })?;
-    let figures = the_loop(&design, console, &mut report)?;
+    let next = format!(
+        "host-fit codegen {} --lang python -o identified.py",
+        shell_word(&out.join("controlled.toml"))
+    );
+    let figures = the_loop(&design, &next, console, &mut report)?;
     write_atomic(&out.join("report.html"), |file| {
         file.write_all(report.html().as_bytes())
     })?;
@@ -189,13 +194,30 @@ fn real_input(
         models.push((name.to_owned(), found.model));
     }
     let borrowed: Vec<(String, &Model)> = models.iter().map(|(n, m)| (n.clone(), m)).collect();
-    let compared = steps::compare_several(&borrowed, &set).map_err(|(_, error)| error)?;
+    let mut compared = steps::compare_several(&borrowed, &set).map_err(|(_, error)| error)?;
+    let best = compared.best().map(|best| best.model.clone());
+    let best = models
+        .iter()
+        .position(|(name, _)| Some(name) == best.as_ref());
+    let (_, _, file) = kinds[best.unwrap_or(0)];
+    let answer = std::mem::take(&mut compared.answer);
+    compared.answer = answer.with_files(
+        &shell_word(&out.join(file)),
+        &shell_word(&data.join("ramp-cfd")),
+    );
     let runs: Vec<(&str, &[Vec<f64>])> = compared
         .models
         .iter()
         .map(|named| (named.model.as_str(), named.comparison.runs.as_slice()))
         .collect();
-    let worst = lead(report, &compared.answer, None, &set.records, &runs);
+    let picture = errors_of_models(&compared);
+    let worst = lead(
+        report,
+        &compared.answer,
+        picture.as_ref(),
+        &set.records,
+        &runs,
+    );
     report.fold("Every record of part 1");
     for named in &compared.models {
         report.subsection(&named.model);
@@ -210,6 +232,7 @@ fn real_input(
         &rows,
         1,
     )))?;
+    console.say(&indented(&short_form(&compared.answer)))?;
     Ok(fits)
 }
 
@@ -293,6 +316,14 @@ fn beyond_the_catalogue(
     let mut found = found;
     let model = shell_word(&out.join("beyond-before.toml"));
     found.answer = found.answer.with_files(&model, &shell_word(&folder));
+    if !found.discovery.terms.is_empty() {
+        // The demo has written the files of `discover` already.
+        found.answer.next = format!(
+            "host-fit diagnose {} {}",
+            shell_word(&out.join("beyond-after.toml")),
+            shell_word(&folder)
+        );
+    }
     console.say("\n3. a ramp with an effect outside the catalogue: discover")?;
     console.say(&indented(&short_form(&found.answer)))?;
     report.section("3. A ramp with an effect outside the catalogue: discover");
@@ -340,6 +371,7 @@ fn hidden_plant() -> anyhow::Result<PlantSpec> {
 /// precision, as on the board; the reference run in `identified.rs` comes from this code.
 fn the_loop(
     design: &Design,
+    next: &str,
     console: Console,
     report: &mut Report,
 ) -> anyhow::Result<Vec<LoopRow>> {
@@ -369,7 +401,29 @@ fn the_loop(
         }
     });
     report.section("4. The generated law in the loop, at 1 kHz on the plant");
+    let [_, relay_row, law] = &rows;
+    let holds = (law.mean_friction - TARGET).abs() <= 0.05 * TARGET;
+    let (tone, verdict) = match holds {
+        true => (Tone::Good, format!("the law holds y at {TARGET}")),
+        false => (
+            Tone::Warning,
+            format!("the law does not hold y at {TARGET}"),
+        ),
+    };
+    let answer = Answer::new(tone, verdict)
+        .evidence(format!(
+            "On the plant, after the first second: mean y {}, rms error {}, with a relay {}.",
+            significant(law.mean_friction, 3),
+            significant(law.rms_error, 3),
+            significant(relay_row.rms_error, 3)
+        ))
+        .confidence(
+            "One simulated run of 10 s on the true plant of part 2, without sensor noise; `host-fit design` makes the trials \
+             that decide.",
+        )
+        .next(next);
     report.columns().cell();
+    card(report, &answer);
     let table: Vec<Vec<String>> = rows
         .iter()
         .map(|r| {
@@ -408,5 +462,6 @@ fn the_loop(
     console.say("\n4. the generated law in the loop, on the plant: hold y at 0.7")?;
     let head = ["controller", "mean y", "rms error", "switches/s", "air"];
     console.say(&indented(&aligned(&head, &table, 1)))?;
+    console.say(&indented(&answer.words()))?;
     Ok(rows.to_vec())
 }

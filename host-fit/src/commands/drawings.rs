@@ -3,7 +3,7 @@
 use closed_loop::Trace;
 use host_fit::data::Record;
 use host_fit::design::{Margin, Proof};
-use host_fit::diagnose::Diagnosis;
+use host_fit::diagnose::{Diagnosis, RULES};
 use host_fit::experiment::Separation;
 use host_fit::indicators::ErrorKind;
 use host_fit::picture::{
@@ -64,6 +64,41 @@ pub(crate) fn ladder_picture(diagnosis: &Diagnosis) -> Picture {
         steps: &steps,
         records: &records,
         noise_rmse: diagnosis.ladder.last().and_then(|rung| rung.noise_rmse),
+    })
+}
+
+/// The error of the given model and that of the final one, as two bars. All steps are drawn if no effect was added, or if
+/// the given model fits as well as the final one: then the answer compares with a step between them.
+pub(crate) fn before_and_after_picture(diagnosis: &Diagnosis) -> Picture {
+    let [given, between @ .., last] = diagnosis.ladder.as_slice() else {
+        return ladder_picture(diagnosis);
+    };
+    let falls = last.validate_rmse <= (1.0 - RULES.worthwhile) * given.validate_rmse;
+    if between.is_empty() || last.effects.is_empty() || !falls {
+        return ladder_picture(diagnosis);
+    }
+    let bars = [given, last].map(|rung| (rung.step.as_str(), rung.validate_rmse));
+    errors_picture(diagnosis.held_out_by.compared(), &bars, last.noise_rmse)
+}
+
+/// The errors of several models as bars.
+pub(crate) fn errors_picture(
+    kind: ErrorKind,
+    bars: &[(&str, f64)],
+    noise_rmse: Option<f64>,
+) -> Picture {
+    let finite = bars.iter().filter(|(_, rmse)| rmse.is_finite());
+    let steps: Vec<LadderStep<'_>> = finite
+        .map(|&(label, rmse)| LadderStep { label, rmse })
+        .collect();
+    ladder(&Ladder {
+        title: kind.title(),
+        error: kind.title(),
+        scored: kind.records(),
+        y_unit: "y",
+        steps: &steps,
+        records: &[],
+        noise_rmse,
     })
 }
 

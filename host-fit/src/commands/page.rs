@@ -1,26 +1,29 @@
 //! Results as pages.
 
-use host_fit::data::{DataSet, Record};
+use host_fit::data::{DataSet, Plant, Record};
 use host_fit::diagnose::{Diagnosis, RULES};
 use host_fit::discover::{Entry, FoundTerm, TRACED, Trace};
-use host_fit::indicators::{ErrorKind, Scores, score};
+use host_fit::indicators::{ErrorKind, Indicators, Scores, score};
 use host_fit::model::Model;
 use host_fit::picture::{
     BandPoint, Candidate, Column, CurvePlot, Living, Picture, Ranking, Report, Stretches,
     WhereItFails, curve, ranking, significant,
 };
 use host_fit::residual::Failures;
-use host_fit::steps::{Answer, Comparison, Extension, Finding, Identification, SideBySide, Terms};
+use host_fit::steps::{
+    Answer, Comparison, Extension, Finding, Identification, SideBySide, Terms, effect_in_words,
+};
 
 use super::drawings::{
-    experiment_picture, ladder_picture, margin_picture, proof_picture, step_by_step,
+    before_and_after_picture, errors_picture, experiment_picture, ladder_picture, margin_picture,
+    proof_picture, step_by_step,
 };
 use super::page_parts::{Run, Stretch, card, checks, stretch_picture, worst_stretch};
 use super::tried::Tried;
 use super::words::{
-    PARAMETERS, SIDE_BY_SIDE, TRIALS, Words, describe, dropped_terms, ladder_caption, ladder_rows,
-    named_first, parameter_rows, ranking_rows, role_name, score_rows, side_by_side_rows,
-    trial_caption, trial_rows,
+    PARAMETERS, SIDE_BY_SIDE, TRIALS, Words, describe, dropped_terms, has_envelope, ladder_caption,
+    ladder_rows, named_first, parameter_rows, ranking_rows, role_name, score_rows,
+    side_by_side_rows, trial_caption, trial_rows,
 };
 
 /// The page of a comparison, made by `command`.
@@ -56,7 +59,14 @@ pub(crate) fn side_by_side(
         .first()
         .map(|(_, model)| model.targets(&set.records))
         .unwrap_or_default();
-    let worst = lead(&mut report, &found.answer, None, &records, &pairs(&runs));
+    let picture = errors_of_models(found);
+    let worst = lead(
+        &mut report,
+        &found.answer,
+        picture.as_ref(),
+        &records,
+        &pairs(&runs),
+    );
     let [first, rest @ ..] = SIDE_BY_SIDE;
     let columns = std::iter::once(Column::Text(first)).chain(rest.map(Column::Number));
     report.table(
@@ -78,6 +88,18 @@ pub(crate) fn side_by_side(
         provenance(&mut report, set, model.training.seed, command);
     }
     report.html()
+}
+
+/// The errors of the models as bars, if all are on the same records and few enough for one picture.
+pub(super) fn errors_of_models(found: &SideBySide) -> Option<Picture> {
+    const MOST: usize = 6;
+    let scored = found.models.iter();
+    let scored: Vec<(&str, &Indicators)> = scored
+        .filter_map(|named| Some((named.model.as_str(), named.comparison.scores.held_out()?)))
+        .collect();
+    let (_, first) = *scored.first()?;
+    let bars: Vec<(&str, f64)> = scored.iter().map(|(name, of)| (*name, of.rmse)).collect();
+    (bars.len() <= MOST).then(|| errors_picture(ErrorKind::of(first.role), &bars, first.noise_rmse))
 }
 
 /// The page of an identification.
@@ -119,7 +141,22 @@ pub(crate) fn extension(
         .into_iter()
         .chain([run("after", model, &after.runs)])
         .collect();
-    let worst = lead(&mut report, &found.answer, None, &records, &pairs(&runs));
+    let changed = found.before.as_ref().zip(found.after.as_ref());
+    let picture = changed.map(|(before, after)| {
+        let with = format!("with {}", found.effects.join(" and "));
+        let bars = [
+            ("the model as given", before.rmse),
+            (with.as_str(), after.rmse),
+        ];
+        errors_picture(ErrorKind::of(after.role), &bars, after.noise_rmse)
+    });
+    let worst = lead(
+        &mut report,
+        &found.answer,
+        picture.as_ref(),
+        &records,
+        &pairs(&runs),
+    );
     report.section("The model");
     report.paragraph(&describe(model));
     if let Some(dropped) = dropped_terms(found) {
@@ -190,7 +227,7 @@ pub(crate) fn finding(
     report.html()
 }
 
-/// The first screen of a diagnosis: answer, error by step, the two seconds with the largest error before and
+/// The first screen of a diagnosis: answer, error before and after, the two seconds with the largest error before and
 /// after.
 pub(crate) fn finding_lead(
     report: &mut Report,
@@ -202,7 +239,7 @@ pub(crate) fn finding_lead(
     let mut runs: Vec<(&str, &[Vec<f64>])> = Vec::new();
     runs.extend(found.runs_before.as_deref().map(|runs| ("as given", runs)));
     runs.extend(found.runs.as_deref().map(|runs| (after_label(found), runs)));
-    let ladder = ladder_picture(&found.diagnosis);
+    let ladder = before_and_after_picture(&found.diagnosis);
     let falling = (found.diagnosis.ladder.len() > 1).then_some(&ladder);
     lead(report, &found.answer, falling, &records, &runs)
 }
@@ -566,19 +603,26 @@ pub(super) fn living(
 
 /// The indicators as a table of a report.
 pub(crate) fn report_scores(report: &mut Report, scores: &Scores) {
+    let mut columns = vec![
+        Column::Text("record"),
+        Column::Text("use"),
+        Column::Number("FIT, %"),
+        Column::Number("ρ"),
+        Column::Number("RMSE"),
+        Column::Number("noise"),
+        Column::Number("ε"),
+    ];
+    columns.extend(has_envelope(scores).then_some(Column::Number("inside")));
     report.table(
-        "Free run against the measurement. FIT, ρ and ε are eqs. (10), (11) and (9) of the paper. Noise is the \
-         standard error of the measurement. “Inside” is the share of samples that lie within the measurement's envelope, from y_min to y_max.",
-        &[
-            Column::Text("record"),
-            Column::Text("use"),
-            Column::Number("FIT, %"),
-            Column::Number("ρ"),
-            Column::Number("RMSE"),
-            Column::Number("noise"),
-            Column::Number("ε"),
-            Column::Number("inside"),
-        ],
+        &format!(
+            "Free run against the measurement. FIT, ρ and ε are eqs. (10), (11) and (9) of the paper. ε is the root of a sum \
+             over samples, so it is larger for all records together. Noise is the standard error of the measurement.{}",
+            match has_envelope(scores) {
+                true => " “Inside” is the share of samples that lie within the measurement's envelope, from y_min to y_max.",
+                false => "",
+            }
+        ),
+        &columns,
         &score_rows(scores).into_iter().map(Vec::from).collect::<Vec<_>>(),
     );
 }
@@ -591,7 +635,8 @@ fn report_failures(report: &mut Report, failures: &Failures) {
     }
     report.bars(
         &failures_picture(failures),
-        "Each panel splits the same error by one coordinate. Click a bar to mark its samples in the records below.",
+        "Each panel splits the same error by one coordinate. The bins have unequal widths (the numbers are their limits), but the \
+         bars are drawn equally wide. Click a bar to mark its samples in the records below.",
     );
 }
 
@@ -607,6 +652,9 @@ pub(super) fn failures_picture(failures: &Failures) -> Picture {
 fn report_candidates(report: &mut Report, found: &Finding) {
     let diagnosis = &found.diagnosis;
     report.section(&step_by_step(diagnosis.held_out_by.compared()));
+    if diagnosis.ladder.len() > 2 {
+        report.figure(&ladder_picture(diagnosis), "");
+    }
     report.table(
         ladder_caption(&diagnosis.ladder),
         &LADDER,
@@ -614,7 +662,10 @@ fn report_candidates(report: &mut Report, found: &Finding) {
     );
     if !diagnosis.ranking.is_empty() {
         report.section("Candidates");
-        report.figure(&ranking_picture(diagnosis), &candidates_caption(diagnosis));
+        report.figure(
+            &ranking_picture(diagnosis, found.plant),
+            &candidates_caption(diagnosis),
+        );
         report.table(
             "Nats: ln of the Bayes factor of the model with the effect against the model without it. p is family-wise: \
              it is corrected for all models that were tried. Screened only: the first-order estimate was too small to refit.",
@@ -626,7 +677,7 @@ fn report_candidates(report: &mut Report, found: &Finding) {
                 Column::Number("p"),
                 Column::Text("parameters (95 % interval)"),
             ],
-            &ranking_rows(diagnosis),
+            &ranking_rows(diagnosis, found.plant),
         );
     }
     if !found.detectable.is_empty() {
@@ -639,7 +690,10 @@ fn report_candidates(report: &mut Report, found: &Finding) {
         let lines: Vec<String> = diagnosis
             .not_tried
             .iter()
-            .map(|n| format!("`{}`: {}", n.effect, n.reason))
+            .map(|n| match found.plant {
+                Plant::Flow => format!("`{}`: {}", n.effect, n.reason),
+                plant => format!("{}: {}", effect_in_words(&n.effect, plant), n.reason),
+            })
             .collect();
         report.list(&lines);
     }
@@ -659,12 +713,18 @@ fn candidates_caption(diagnosis: &Diagnosis) -> String {
 }
 
 /// Every candidate's error.
-pub(super) fn ranking_picture(diagnosis: &Diagnosis) -> Picture {
+pub(super) fn ranking_picture(diagnosis: &Diagnosis, plant: Plant) -> Picture {
     let kind = diagnosis.held_out_by.judged();
-    let candidate = |r| {
+    let ranked = named_first(diagnosis);
+    let names: Vec<String> = ranked
+        .iter()
+        .map(|r| effect_in_words(&r.effect, plant))
+        .collect();
+    let candidate = |(r, name)| {
         let r: &host_fit::diagnose::Ranked = r;
+        let name: &String = name;
         Candidate {
-            name: &r.effect,
+            name,
             rmse: r.validate_rmse,
             low: f64::NAN,
             high: f64::NAN,
@@ -677,8 +737,7 @@ pub(super) fn ranking_picture(diagnosis: &Diagnosis) -> Picture {
             },
         }
     };
-    let candidates: Vec<Candidate<'_>> =
-        named_first(diagnosis).into_iter().map(candidate).collect();
+    let candidates: Vec<Candidate<'_>> = ranked.into_iter().zip(&names).map(candidate).collect();
     ranking(&Ranking {
         title: &format!("{} with each effect", kind.title()),
         y_unit: "y",

@@ -8,8 +8,9 @@ use host_fit::data::{Record, Use};
 use host_fit::indicators::ErrorKind;
 use host_fit::model::Model;
 use host_fit::picture::{
-    Column, FrequencyCurve, FrequencyPlot, LabelledRun, Line, LinePlot, MeasuredResponse, Overlay,
-    Picture, Report, Tone, frequency, lines, overlay, significant,
+    Column, FrequencyCurve, FrequencyPlot, LabelledRun, Line, LinePlot, MAGNITUDE_DEPTH_DB,
+    MeasuredResponse, Overlay, PHASE_DEPTH_DEG, Picture, Report, Tone, frequency, lines, overlay,
+    significant,
 };
 use host_fit::steps::{self, Answer};
 
@@ -247,7 +248,8 @@ pub(crate) fn check_figures(records: &[Record], runs: &[Run<'_>]) -> Vec<Figure>
             log_x: false,
         }),
         format!(
-            "Peaks outside the band at positive lags show dynamics from u to y that the model lacks. Share of the lags outside: {}.",
+            "Peaks outside the band at positive lags show dynamics from u to y that the model lacks. Share of the lags outside \
+             (5 % is expected of a complete model): {}.",
             outside(&|i| tested[i].1.outside)
         ),
     ));
@@ -293,7 +295,7 @@ fn spectra(runs: &[Run<'_>], residuals: &[Residuals]) -> Option<Figure> {
     }];
     if let Some(noise) = &noise {
         drawn.push(Line {
-            label: "noise of `y_sd`, if white",
+            label: "noise y_sd, if white",
             points: noise,
             colour: None,
             dashed: true,
@@ -309,7 +311,8 @@ fn spectra(runs: &[Run<'_>], residuals: &[Residuals]) -> Option<Figure> {
             band: None,
             log_x: true,
         }),
-        "Welch's estimate. If the residual exceeds the noise at a frequency, the model lacks dynamics there.".to_owned(),
+        "Welch's estimate. If the residual exceeds the noise at a frequency, the model lacks dynamics there, or the noise is \
+         coloured.".to_owned(),
     ))
 }
 
@@ -422,12 +425,21 @@ fn over_records(
         }),
         format!(
             "Cross-spectrum of u and y divided by the spectrum of u, in twelve bands per decade, from the {kind}; \
-             unit: y per full jet. The curves are the same estimate from the free runs. Only bands with significant \
+             unit: y per full command. The curves are the same estimate from the free runs. Only bands with significant \
              coherence (5 % level) are drawn. The 95 % limits account for measurement noise and for the part of y \
              that is not linear in u. They hold for each band separately. If a curve leaves the limits, the model \
-             lacks dynamics there."
+             lacks dynamics there. {}",
+            drawing_limits()
         ),
     ))
+}
+
+/// The part of a frequency response that is drawn.
+fn drawing_limits() -> String {
+    format!(
+        "Magnitudes more than {MAGNITUDE_DEPTH_DB} dB below the largest and phases more than {PHASE_DEPTH_DEG}° below the \
+         largest are not drawn."
+    )
 }
 
 /// The frequency response of each model, linearised at the two levels of the step response.
@@ -456,10 +468,12 @@ fn at_levels(runs: &[Run<'_>], levels: &[[Option<FrequencyResponse>; 2]]) -> Opt
     if curves.is_empty() {
         return None;
     }
-    let mut caption = "Each model with its effects and its dead time, linearised at rest (command off) and in the \
-                       steady state with the command on. Unit: y per full jet, for small changes of the duty. No \
-                       confidence band is drawn, because a model file has no covariance of its coefficients."
-        .to_owned();
+    let mut caption = format!(
+        "Each model with its effects and its dead time, linearised at rest (command off) and in the steady state with the \
+         command on. Unit: y per full command, for small changes of the duty. No confidence band is drawn, because a \
+         model file has no covariance of its coefficients. {}",
+        drawing_limits()
+    );
     if levels.iter().flatten().any(Option::is_none) {
         caption.push_str(
             " A level is not drawn if the model does not settle there, or is not linear for small changes of the command.",

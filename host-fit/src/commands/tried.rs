@@ -1,6 +1,7 @@
 //! A designed law with its trials in closed loop.
 
-use host_fit::design::{Margin, Proof};
+use closed_loop::{Figures, span};
+use host_fit::design::{Case, CaseGroup, Margin, Proof, RULES};
 use host_fit::picture::significant;
 use host_fit::steps::{Answer, Design, DesignOutcome, TargetVerdict, Tone};
 use serde::Serialize;
@@ -34,8 +35,8 @@ impl Tried {
         let lost = self.design.law.lost();
         (!lost.is_empty()).then(|| {
             format!(
-                "the law was not written: it loses attachment on plants that are consistent with the records: {}. {} {switch} \
-                 writes it anyway, with a note in the file",
+                "the law was not written: it loses attachment on {}: {}. {} {switch} writes it anyway, with a note in the file",
+                self.deciding_plants(),
                 few(lost),
                 self.next_step()
             )
@@ -70,22 +71,25 @@ impl Tried {
         let verdict = self.verdict();
         let mut lines = verdict.lines();
         let evidence = lines.next().unwrap_or_default();
-        // For a tracking law, the evidence is its errors on the model without noise.
-        let tracks = matches!(self.design.outcome, DesignOutcome::Track(_));
-        let model = self.proof.cases.first().filter(|_| tracks);
-        let settles = model.is_none_or(|case| case.figures.settling_s.is_some());
-        let (tone, said) = match (self.proof.lost().is_empty(), settles) {
-            (true, true) => (Tone::Good, "the law keeps attachment"),
-            (true, false) => (
+        let held = self.held();
+        let (tone, said) = match (self.proof.lost().is_empty(), held) {
+            (true, Held::Yes) => (Tone::Good, "the law keeps attachment"),
+            (true, Held::NoSwitch) => (
                 Tone::Warning,
-                "the law keeps attachment, but does not settle at the target",
+                "the law does not hold the target: the valve does not switch",
+            ),
+            (true, Held::No) => (
+                Tone::Warning,
+                "the law keeps attachment, but does not hold the target",
             ),
             (false, _) => (Tone::Warning, "the law loses attachment"),
         };
-        let on_the_model = model.map_or_else(String::new, |case| {
-            let figures = &case.figures;
+        let on_the_model = self.on_the_model().map_or_else(String::new, |figures| {
+            let period_s = self.proof.trace.sample_period_s;
+            let [from, until] = [RULES.trial_from, RULES.trial]
+                .map(|samples| significant(span(samples, period_s) as f64 * period_s, 3));
             format!(
-                " On the model: mean y {}, rms error {}, {:.1} switches/s.",
+                " On the model with a noisy sensor, from {from} to {until} s: mean y {}, rms error {}, {:.1} switches/s.",
                 significant(figures.mean, 3),
                 significant(figures.rms, 3),
                 figures.switches_per_s
@@ -97,26 +101,77 @@ impl Tried {
             .confidence(margin.map_or_else(String::new, |margin| {
                 format!("{}.", capitalised(margin.trim_end_matches('.')))
             }))
-            .next(format!("host-fit codegen {} -o identified.rs", self.file));
+            .next(match held {
+                Held::Yes => format!("host-fit codegen {} -o identified.rs", self.file),
+                // The remark on the shortest times says what to change; no command is known to hold the target.
+                Held::No | Held::NoSwitch => String::new(),
+            });
+        if held == Held::NoSwitch {
+            for remark in self
+                .remarks()
+                .iter()
+                .filter(|remark| remark.contains("does not switch"))
+            {
+                answer.note(capitalised(remark));
+            }
+        }
         for line in lines.chain(self.not_tried.iter().map(String::as_str)) {
             answer.note(line);
         }
         answer
     }
 
+    /// The figures of a tracking law on the model with a noisy sensor, the trial of the picture.
+    fn on_the_model(&self) -> Option<&Figures> {
+        let tracks = matches!(self.design.outcome, DesignOutcome::Track(_));
+        let model = |case: &&Case| case.group == CaseGroup::Model;
+        let last = self.proof.cases.iter().rfind(model).filter(|_| tracks);
+        last.map(|case| &case.figures)
+    }
+
+    /// Whether the law holds its target on the model.
+    fn held(&self) -> Held {
+        match self.on_the_model() {
+            None => Held::Yes,
+            Some(figures) if figures.settling_s.is_some() => Held::Yes,
+            Some(figures) if figures.switches_per_s == 0.0 => Held::NoSwitch,
+            Some(_) => Held::No,
+        }
+    }
+
+    /// Remarks of the design of a tracking law.
+    fn remarks(&self) -> &[String] {
+        match &self.design.outcome {
+            DesignOutcome::Track(design) => &design.remarks,
+            DesignOutcome::Maximise(_) => &[],
+        }
+    }
+
+    /// The plants whose trials decide. Without records these are the trials on the model alone.
+    fn deciding_plants(&self) -> &'static str {
+        let from_records = |case: &Case| case.group == CaseGroup::Possible;
+        match self.proof.cases.iter().any(from_records) {
+            true => "plants that are consistent with the records",
+            false => "the model",
+        }
+    }
+
     /// The result of the trials in two sentences.
     pub(super) fn verdict(&self) -> String {
         let decide = self.proof.cases.iter().filter(|case| case.group.decides());
         let (decide, lost) = (decide.count(), self.proof.lost());
+        let plants = self.deciding_plants();
         let mut text = if lost.is_empty() && decide == 1 {
             "attachment is kept in the trial on the model; no other trial decides".to_owned()
         } else if lost.is_empty() {
-            format!(
-                "attachment is kept in all {decide} trials on plants that are consistent with the records"
-            )
+            let all = match decide {
+                2 => "both".to_owned(),
+                _ => format!("all {decide}"),
+            };
+            format!("attachment is kept in {all} trials on {plants}")
         } else {
             format!(
-                "attachment is lost in {} of {decide} trials on plants that are consistent with the records: {}",
+                "attachment is lost in {} of {decide} trials on {plants}: {}",
                 lost.len(),
                 few(&lost)
             )
@@ -130,6 +185,17 @@ impl Tried {
         }
         text
     }
+}
+
+/// Whether a law holds its target on the model.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Held {
+    /// The mean of y settles at the target; also for pulses, which have no target.
+    Yes,
+    /// The mean of y stays away from the target.
+    No,
+    /// The valve stays in one position.
+    NoSwitch,
 }
 
 /// A sentence with a capital letter.

@@ -18,7 +18,7 @@ use crate::power::detectable;
 use crate::preparation::Preparation;
 use crate::simulate::SimulateError;
 use crate::terms::Units;
-use model_core::effect::{Place, Spec};
+use model_core::effect::{Place, Spec, Unit};
 
 /// Half width of a 95 % interval in standard errors.
 const DEVIATES: f64 = 1.96;
@@ -323,7 +323,13 @@ fn in_words(spec: &Spec, parameters: &[f64]) -> String {
         None => {
             let each = spec.parameters.iter().zip(parameters);
             let each: Vec<String> = each
-                .map(|(card, value)| format!("{} {}", card.name, significant(*value, 2)))
+                .map(|(card, value)| {
+                    let value = significant(*value, 2);
+                    match card.unit {
+                        Unit::None => format!("{} {value}", card.name),
+                        unit => format!("{} {value} {unit}", card.name),
+                    }
+                })
                 .collect();
             format!(" ({})", each.join(", "))
         }

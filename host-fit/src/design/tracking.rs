@@ -259,7 +259,7 @@ pub fn track(model: &Model, request: &TrackRequest) -> Result<TrackDesign, Desig
         let ms = |samples: u32| (1e6 * f64::from(samples) * period_s).round() / 1e3;
         remarks.push(format!(
             "on the model the valve does not switch after the start: shortest times of {} ms open and {} ms closed \
-             are too long for its response; give shorter ones (`--min-on`, `--min-off`) if the valve can follow them",
+             are too long for its response; choose another target, or give shorter times (`--min-on`, `--min-off`) if the valve can follow them",
             ms(law.hold.on),
             ms(law.hold.off)
         ));

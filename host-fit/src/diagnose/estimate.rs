@@ -22,6 +22,10 @@ pub struct ParameterEstimate {
     pub low: f64,
     /// Upper end.
     pub high: f64,
+    /// Whether the records determine the parameter: the interval is finite and does not cover the whole range of the
+    /// parameter.
+    #[serde(skip)]
+    pub determined: bool,
 }
 
 /// Estimates of an effect's parameters with 95 % intervals, of a fit in inner `units`.
@@ -64,11 +68,13 @@ pub(crate) fn estimates_among(
             (value - half, value + half)
         };
         let out = |value: f64| units.value_out(parameter.unit, value);
+        let covers = low <= parameter.low && high >= parameter.high;
         let estimate = ParameterEstimate {
             value: out(value),
             unit: parameter.unit.symbol().to_owned(),
             low: out(low.max(parameter.low.min(value))),
             high: out(high.min(parameter.high.max(value))),
+            determined: half.is_finite() && !covers,
         };
         (parameter.name.to_owned(), estimate)
     })
@@ -123,6 +129,7 @@ mod tests {
                 unit,
                 low,
                 high,
+                determined: true,
             };
             (name.to_owned(), estimate)
         };

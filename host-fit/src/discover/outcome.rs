@@ -256,6 +256,8 @@ fn estimates(inner: &Term, outer: &Term, fitted: &Fit) -> BTreeMap<String, Param
                 unit: card.unit.symbol().to_owned(),
                 low: (outside - half).max(card.low),
                 high: (outside + half).min(card.high),
+                determined: half.is_finite()
+                    && (outside - half > card.low || outside + half < card.high),
             };
             (card.name.to_owned(), estimate)
         })

@@ -56,9 +56,26 @@ pub fn significant(value: f64, digits: usize) -> String {
     }
 }
 
+/// `value` with a fixed number of decimals, a true minus sign, and a plus sign if it is positive.
+///
+/// ```
+/// use host_fit::picture::signed;
+/// assert_eq!([0.138, -0.011, -1e-9].map(|x| signed(x, 3)), ["+0.138", "−0.011", "0.000"]);
+/// ```
+#[must_use]
+pub fn signed(value: f64, decimals: usize) -> String {
+    let text = fixed(value, decimals, false);
+    let is_zero = text.chars().all(|c| c == '0' || c == '.');
+    match value > 0.0 && !is_zero {
+        true => format!("+{text}"),
+        false => text,
+    }
+}
+
 /// `value` with a fixed number of decimals and a true minus sign; `trim` drops
 /// trailing zeros.
-pub(super) fn fixed(value: f64, decimals: usize, trim: bool) -> String {
+#[must_use]
+pub fn fixed(value: f64, decimals: usize, trim: bool) -> String {
     let mut text = format!("{value:.decimals$}");
     if trim && text.contains('.') {
         let kept = text.trim_end_matches('0').trim_end_matches('.').len();

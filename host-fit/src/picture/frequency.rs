@@ -44,9 +44,9 @@ pub struct FrequencyPlot<'a> {
 /// Largest number of points drawn of a curve.
 const MOST_POINTS: usize = 600;
 /// Range of the magnitude below its largest value, dB.
-const DEPTH: f64 = 60.0;
+pub const DEPTH: f64 = 60.0;
 /// Range of the phase below its largest value, degrees.
-const TURN: f64 = 720.0;
+pub const TURN: f64 = 720.0;
 /// Height of a panel and distance between the two, pixels.
 const HEIGHT: f64 = 190.0;
 const BETWEEN: f64 = 20.0;

@@ -33,8 +33,11 @@ pub use canvas::Picture;
 pub use closed_loop::{ClosedLoop, LoopRun, closed_loop};
 pub use curve::{BandPoint, CurvePlot, curve};
 pub use delay_law::{DelayEdge, DelayLawPlot, LawPoint, MeasuredDelay, delay_law};
-pub use format::{readable_time, significant, time};
-pub use frequency::{FrequencyCurve, FrequencyPlot, MeasuredResponse, frequency};
+pub use format::{fixed, readable_time, signed, significant, time};
+pub use frequency::{
+    DEPTH as MAGNITUDE_DEPTH_DB, FrequencyCurve, FrequencyPlot, MeasuredResponse,
+    TURN as PHASE_DEPTH_DEG, frequency,
+};
 pub use ladder::{Ladder, LadderRecord, LadderStep, ladder};
 pub use lines::{Line, LinePlot, lines};
 pub use living::{Living, Stretches, packed};

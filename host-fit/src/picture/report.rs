@@ -186,11 +186,11 @@ impl Report {
         for column in columns {
             match column {
                 Column::Text(name) => {
-                    self.push(format_args!("<th scope=\"col\">{}</th>", inline(name)))
+                    self.push(format_args!("<th scope=\"col\">{}</th>", head(name)))
                 }
                 Column::Number(name) => self.push(format_args!(
                     "<th scope=\"col\" class=\"n\">{}</th>",
-                    inline(name)
+                    head(name)
                 )),
             };
         }
@@ -345,6 +345,50 @@ fn page(title: &str, bundle: &Bundle, policy: &str, class: &str, body: &str) -> 
     )
 }
 
+/// Heads of columns with their explanation, as in the glossary (docs/glossary.md).
+const HEADS: [(&str, &str); 9] = [
+    ("FIT, %", "100 · (1 − ‖y − ŷ‖ / ‖y − mean y‖), %; eq. (10)"),
+    ("RMSE", "root mean square of the residual, in the unit of y"),
+    (
+        "inside",
+        "share of the samples at which ŷ lies within the envelope of the measurement, from `y_min` to `y_max`",
+    ),
+    (
+        "nats",
+        "natural logarithm of the Bayes factor: the model with the candidate against the model without it",
+    ),
+    (
+        "noise",
+        "the standard error `y_sd` of the averaged y, rms; without it, estimated from repeats",
+    ),
+    (
+        "outcome",
+        "screened only: the candidate was rated by a first-order prediction and was too weak to be refitted",
+    ),
+    (
+        "p",
+        "family-wise: upper bound of the probability that the best of all candidates has this much evidence although no \
+         effect is present",
+    ),
+    (
+        "ε",
+        "square root of the sum of (y − ŷ)² over the samples; eq. (9)",
+    ),
+    ("ρ", "correlation coefficient of y and ŷ; eq. (11)"),
+];
+
+/// The head of a column; one of [`HEADS`] shows its explanation under the mouse.
+fn head(name: &str) -> String {
+    let known = HEADS.iter().find(|(head, _)| *head == name);
+    known.map_or_else(
+        || inline(name),
+        |(_, meaning)| {
+            let meaning = escape(&meaning.replace('`', ""));
+            format!("<abbr title=\"{meaning}\">{}</abbr>", inline(name))
+        },
+    )
+}
+
 /// Escaped text with `` `code` `` marked; a backtick without a partner stays.
 fn inline(text: &str) -> String {
     let mut marked = String::with_capacity(text.len() + 16);
@@ -397,7 +441,7 @@ section{scroll-margin-top:8px}\
 table{border-collapse:collapse;font-size:.94rem;font-variant-numeric:tabular-nums}\
 .caption{color:var(--muted);font-size:.94rem;margin-bottom:0}\
 th,td{padding:5px 14px 5px 0;text-align:left;border-bottom:1px solid var(--rule);vertical-align:top}\
-th{font-weight:600;border-bottom-width:2px}\
+th{font-weight:600;border-bottom-width:2px}th abbr{cursor:help}\
 td:first-child{min-width:9em}td:last-child:not(.n){min-width:12em}th.n{white-space:normal!important;min-width:3.2em}\
 .n{text-align:right;padding:5px 8px 5px 14px;white-space:nowrap}\
 figure{margin:18px 0}\
@@ -409,6 +453,10 @@ figcaption{color:var(--muted);font-size:.92rem;max-width:48em;margin-top:4px}\
 footer{margin-top:3em;border-top:1px solid var(--rule);padding-top:10px;color:var(--muted);font-size:.85rem}\
 footer dl{display:grid;grid-template-columns:max-content 1fr;gap:2px 14px;margin:0}\
 footer dd{margin:0;overflow-wrap:anywhere}\
+@media(max-width:700px){.listed{display:flex;flex-direction:column;gap:0}\
+.content,.content>.columns:first-child,.content>.columns:first-child>.cell{display:contents}\
+.listed .content>.columns:first-child .verdict{order:-2}.listed>nav{order:-1}\
+.content>*,.content>.columns:first-child>*{min-width:0}}\
 @media(max-width:600px){main{padding:16px 12px 40px}\
 .verdict{padding:10px 12px}.verdict dl{display:block}.verdict dd{margin:0 0 .5em}}\
 @page{margin:14mm 13mm}\
@@ -464,6 +512,17 @@ mod tests {
             report.section(heading).subsection("sub");
         }
         report.html()
+    }
+
+    #[test]
+    fn heads_are_explained_as_in_the_glossary() {
+        let page = include_str!("../../../docs/glossary.md");
+        for (name, meaning) in HEADS {
+            let meaning = meaning.rsplit_once(": ").map_or(meaning, |(_, last)| last);
+            assert!(page.contains(meaning), "{name}: {meaning}");
+        }
+        assert!(head("ρ").starts_with("<abbr title="));
+        assert_eq!(head("record"), "record");
     }
 
     #[test]

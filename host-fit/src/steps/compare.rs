@@ -56,22 +56,22 @@ pub struct NamedComparison {
     pub comparison: Comparison,
 }
 
-/// Runs each of `models`, which have names, free over every record of `set`.
+/// Runs each of the `given` models, which have names, free over every record of `set`.
 ///
 /// # Errors
 /// [`StepError`] as [`compare`], with the name of the model.
 pub fn compare_several(
-    models: &[(String, &Model)],
+    given: &[(String, &Model)],
     set: &DataSet,
 ) -> Result<SideBySide, (String, StepError)> {
     let of_first = |error| {
         (
-            models.first().map(|(n, _)| n.clone()).unwrap_or_default(),
+            given.first().map(|(n, _)| n.clone()).unwrap_or_default(),
             error,
         )
     };
     let ready = prepared(set).map_err(of_first)?;
-    let each = models.iter().map(|(name, model)| {
+    let each = given.iter().map(|(name, model)| {
         let comparison = check_period(model, set).and_then(|()| compared_on(model, &ready));
         let comparison = comparison.map_err(|error| (name.clone(), error))?;
         Ok(NamedComparison {
@@ -82,12 +82,24 @@ pub fn compare_several(
         })
     });
     let models: Vec<NamedComparison> = each.collect::<Result<_, _>>()?;
-    let scored = models.iter();
-    let scored = scored.map(|named| (named.model.as_str(), &named.comparison.scores));
+    let finished = |name: &str| {
+        let best = given.iter().find(|(own, _)| own == name);
+        best.map_or_else(String::new, |(_, model)| command_after(model))
+    };
     Ok(SideBySide {
-        answer: level::ranked(scored),
+        answer: level::ranked(&models, finished),
         models,
     })
+}
+
+impl SideBySide {
+    /// The model with the lowest error, to which the next command of the answer applies.
+    #[must_use]
+    pub fn best(&self) -> Option<&NamedComparison> {
+        level::ascending(&self.models)
+            .first()
+            .map(|(best, _)| *best)
+    }
 }
 
 fn places<S: Serializer>(failures: &Failures, serializer: S) -> Result<S::Ok, S::Error> {

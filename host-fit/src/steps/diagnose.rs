@@ -26,6 +26,8 @@ use crate::terms::leading_inputs;
 pub struct Finding {
     /// The final model with the missing effects and its training record.
     pub model: Model,
+    /// Kind of plant: in a flow, effects are stated by name, in other plants by what the records show.
+    pub plant: Plant,
     /// The diagnosis.
     pub diagnosis: Diagnosis,
     /// The answer: verdict, evidence, confidence, next command.
@@ -150,7 +152,7 @@ pub fn diagnose(
     let prepared = prepared(set)?;
     let records = model.targets(&prepared.records);
     let (mut judged_rmse, mut channel) = (None, None);
-    let (diagnosis, failures, detectable, beyond) = watched(onlooker, "diagnosis", || {
+    let (mut diagnosis, failures, detectable, beyond) = watched(onlooker, "diagnosis", || {
         let progress = |what: &str| onlooker.now(what);
         let knowing = model.with_inputs(leading_inputs(model, &records));
         let mut diagnosis = search(&knowing, &records, options, onlooker.interrupt(), &progress)?;
@@ -208,7 +210,17 @@ pub fn diagnose(
     if let Some(moving) = &prepared.moving_zero {
         answer.note(moving.to_string());
     }
+    if set.plant != Plant::Flow {
+        // Only the command of the answer has the name of an effect.
+        for rung in &mut diagnosis.ladder {
+            for effect in &rung.effects {
+                let words = symptom::effect_in_words(effect, set.plant);
+                rung.step = rung.step.replace(effect.as_str(), &words);
+            }
+        }
+    }
     Ok(Finding {
+        plant: set.plant,
         model: Model {
             training: Training {
                 stand_ins: diagnosis.stand_ins.clone(),

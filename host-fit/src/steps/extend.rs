@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::{Serialize, Serializer};
 
+use super::design::command_after;
 use super::onlooker::watched;
 use super::prepared::prepared;
 use super::{Answer, Onlooker, StepError, check_period, level, trained_in_free_run};
@@ -13,6 +14,7 @@ use crate::extend::{Extended, extend as refit};
 use crate::indicators::{Indicators, Scores, score, score_new};
 use crate::model::Model;
 use crate::picture::significant;
+use crate::residual::where_it_fails;
 use crate::terms::measured_inputs;
 
 /// A model with effects added. Serialises to the keys of `extend --json`.
@@ -144,6 +146,8 @@ pub fn extend(
     }
     refuse_worse(effects, scores_before.as_ref(), &scores_after)?;
     extended.training = trained_in_free_run(set, &scores_after, model.training.seed);
+    let above_noise = where_it_fails(&extended, &records).map_or(true, |of| of.above_noise);
+    let finished = (!above_noise).then(|| command_after(&extended));
     let several = parameters.len() > 1;
     let named = |effect: &str, name: String| match several {
         true => format!("{effect}.{name}"),
@@ -158,6 +162,7 @@ pub fn extend(
     Ok(Extension {
         answer: level::extended(
             &effects.join(" and "),
+            finished,
             scores_before.as_ref().and_then(Scores::held_out),
             scores_after.held_out(),
         ),

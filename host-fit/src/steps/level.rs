@@ -1,6 +1,6 @@
 //! Wording of an error relative to the noise level, shared by all steps.
 
-use super::{Answer, Tone, verdict::times};
+use super::{Answer, NamedComparison, Tone, verdict::times};
 use crate::analysis::{Correlation, Residuals, correlations};
 use crate::baseline::BaselineFits;
 use crate::data::{Record, Use};
@@ -9,6 +9,7 @@ use crate::indicators::{ErrorKind, Indicators, Scores};
 use crate::order;
 use crate::picture::significant;
 use crate::residual::Failures;
+use statrs::distribution::{ContinuousCDF, StudentsT};
 
 /// "2.64 × the noise level (RMSE 0.0273, FIT 92.7 %)"; without the ratio if there is no `y_sd`.
 pub(super) fn beside_noise(all: &Indicators) -> String {
@@ -104,9 +105,11 @@ pub(super) fn identified(scores: &Scores, fits: &BaselineFits, parameters: usize
     })
 }
 
-/// The answer of an extension by `effects`.
+/// The answer of an extension by `effects`; `finished` is the next command if the error does not exceed the noise level,
+/// otherwise `None`.
 pub(super) fn extended(
     effects: &str,
+    finished: Option<String>,
     before: Option<&Indicators>,
     after: Option<&Indicators>,
 ) -> Answer {
@@ -132,21 +135,85 @@ pub(super) fn extended(
             beside_noise(after)
         ))
         .confidence("A refit is not a significance test; `host-fit diagnose` gives the p-value.")
-        .next("host-fit compare model.toml DATASET --report report.html")
+        .next(finished.unwrap_or_else(|| {
+            "host-fit diagnose model.toml DATASET --report diagnosis.html".to_owned()
+        }))
 }
 
-/// The answer of several models side by side: the best one first.
-pub(super) fn ranked<'a>(models: impl Iterator<Item = (&'a str, &'a Scores)>) -> Answer {
-    let judged = models.filter_map(|(name, scores)| Some((name, scores.held_out()?)));
-    let mut judged: Vec<(&str, &Indicators)> = judged.collect();
+/// Models with a validation error, or an estimation error if there are no validation records, in ascending order of it.
+pub(super) fn ascending(models: &[NamedComparison]) -> Vec<(&NamedComparison, &Indicators)> {
+    let judged = models.iter();
+    let judged = judged.filter_map(|one| Some((one, one.comparison.scores.held_out()?)));
+    let mut judged: Vec<(&NamedComparison, &Indicators)> = judged.collect();
     order::ascending(&mut judged, |one| one.1.rmse);
-    let Some((name, best)) = judged.first() else {
+    judged
+}
+
+/// The answer of several models side by side: the best one first. `finished` is the next command if the error of that
+/// model does not exceed the noise level.
+pub(super) fn ranked(models: &[NamedComparison], finished: impl Fn(&str) -> String) -> Answer {
+    let judged = ascending(models);
+    let Some((first, best)) = judged.first() else {
         return Answer::new(Tone::Warning, "there is no record to compare with");
     };
+    let name = &first.model;
     let error = ErrorKind::of(best.role).name();
     let next = judged.get(1).map_or_else(String::new, |(other, second)| {
-        format!(" Next best: {other}, {}.", beside_noise(second))
+        format!(" Next best: {}, {}.", other.model, beside_noise(second))
     });
     Answer::new(Tone::Finding, format!("{name} has the lowest {error}"))
         .evidence(format!("Free run of {name}: {}.{next}", beside_noise(best)))
+        .confidence(
+            judged
+                .get(1)
+                .map_or_else(String::new, |(second, _)| paired(first, second, best.role)),
+        )
+        .next(match first.comparison.failures.above_noise {
+            true => "host-fit diagnose model.toml DATASET --report diagnosis.html".to_owned(),
+            false => finished(name),
+        })
+}
+
+/// The ratio of the errors of two models, paired over the records with this use: its geometric mean with the 95 % interval
+/// (Student's t of the logarithms). The ratio is used because the errors of all models are larger on livelier records.
+fn paired(best: &NamedComparison, second: &NamedComparison, role: Use) -> String {
+    let records = |of: &NamedComparison| -> Vec<f64> {
+        let all = of.comparison.scores.records.iter();
+        all.filter(|record| record.role == role)
+            .map(|record| record.rmse)
+            .collect()
+    };
+    let (own, other) = (records(best), records(second));
+    let ratios = own
+        .iter()
+        .zip(&other)
+        .map(|(own, other)| (other / own).ln());
+    let logarithms: Vec<f64> = ratios.collect();
+    let kind = ErrorKind::of(role).records();
+    let count = logarithms.len();
+    let n = count as f64;
+    if count < 2 {
+        return "One record alone gives no interval of the difference.".to_owned();
+    }
+    let mean = logarithms.iter().sum::<f64>() / n;
+    let variance = logarithms.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (n - 1.0);
+    let Ok(students) = StudentsT::new(0.0, 1.0, n - 1.0) else {
+        return String::new();
+    };
+    let half = students.inverse_cdf(0.975) * (variance / n).sqrt();
+    if !half.is_finite() {
+        return String::new();
+    }
+    let verdict = match mean > half {
+        true => "the two models are distinguishable",
+        false => "the two models are not distinguishable on these records",
+    };
+    format!(
+        "The RMSE of {} is {} times that of {} (mean over {count} {kind}, paired; 95 % interval {} … {}): {verdict}.",
+        second.model,
+        times(mean.exp()),
+        best.model,
+        times((mean - half).exp()),
+        times((mean + half).exp())
+    )
 }

@@ -65,6 +65,7 @@ pub use import::{ImportedSet, import};
 pub use onlooker::Onlooker;
 pub use rules::{rule_change, rulebooks, rules_pages};
 pub use simulate::{Simulation, simulate};
+pub use symptom::effect_in_words;
 pub use verdict::p_bound;
 
 use crate::data::DataSet;

@@ -186,6 +186,17 @@ pub(super) fn shown(effect: &str, parameters: Option<&Estimates>) -> Option<Stri
     Some(text.replace("{frequency}", &at))
 }
 
+/// The words for `effect` in a plant of this kind: its name in a flow, the behaviour that the records show in other
+/// plants. A user's own effect has its name everywhere.
+#[must_use]
+pub fn effect_in_words(effect: &str, plant: Plant) -> String {
+    let behaviour = match plant {
+        Plant::Flow => None,
+        _ => shown(effect, None),
+    };
+    behaviour.unwrap_or_else(|| effect.to_owned())
+}
+
 /// The meaning of `effect` in a plant of this kind, with its bench check; none if the name is not specific to
 /// the plant.
 pub(super) fn meant(effect: &str, plant: Plant) -> Option<String> {
@@ -224,6 +235,7 @@ mod tests {
                 unit: "Hz".to_owned(),
                 low: 23.0,
                 high: 24.4,
+                determined: true,
             },
         )]);
         let text = shown("vortex-shedding", Some(&own)).unwrap();

@@ -1,7 +1,7 @@
 //! The answer of a diagnosis, in words.
 
 use super::design::command_after;
-use super::symptom::{meant, shown};
+use super::symptom::{effect_in_words, meant, shown};
 use super::{Answer, Tone};
 use crate::data::Plant;
 use crate::diagnose::{Diagnosis, FLOW_LAG, FLOW_MEMORY, HeldOutBy, Memory, RULES, Rung, Verdict};
@@ -56,10 +56,10 @@ pub(super) fn answer(
     for set in diagnosis.sets.iter().filter(|set| set.len() > 1) {
         answer.note(format!(
             "Not distinguishable on these data: {}.",
-            set.join(", ")
+            named(set, plant).join(", ")
         ));
     }
-    surrogates(&mut answer, diagnosis);
+    surrogates(&mut answer, diagnosis, plant);
     records(&mut answer, diagnosis, judged_rmse);
     answer.note(bench_check(&diagnosis.sets));
     dynamics(&mut answer, diagnosis);
@@ -123,6 +123,12 @@ fn joined(names: &[String]) -> String {
     names.join(" and ")
 }
 
+/// The effects in the words for this kind of plant.
+fn named(names: &[String], plant: Plant) -> Vec<String> {
+    let each = names.iter();
+    each.map(|name| effect_in_words(name, plant)).collect()
+}
+
 fn finding(diagnosis: &Diagnosis, plant: Plant) -> Answer {
     let rmse = |rung: Option<&Rung>| rung.map_or(f64::NAN, |rung| rung.validate_rmse);
     let first = rmse(diagnosis.ladder.first());
@@ -143,15 +149,17 @@ fn finding(diagnosis: &Diagnosis, plant: Plant) -> Answer {
             )
             .next(command_after(&diagnosis.model)),
         Verdict::EffectMissing => {
-            let named = [diagnosis.missing.as_slice(), &diagnosis.stand_ins].concat();
+            let all = [diagnosis.missing.as_slice(), &diagnosis.stand_ins].concat();
             Answer::new(Tone::Finding, claim(diagnosis, plant))
                 .evidence(match plant {
                     Plant::Flow => format!(
                         "{} The records show {}.",
-                        fall(diagnosis, &joined(&named)),
+                        fall(diagnosis, &joined(&all)),
                         behaviour(diagnosis)
                     ),
-                    _ => fall(diagnosis, &joined(&named)),
+                    // The verdict has the behaviour.
+                    _ if all.len() == 1 => fall(diagnosis, "this behaviour"),
+                    _ => fall(diagnosis, "these behaviours"),
                 })
                 .confidence(confidence(diagnosis))
                 .next(add(&diagnosis.missing))
@@ -196,7 +204,7 @@ fn finding(diagnosis: &Diagnosis, plant: Plant) -> Answer {
             Answer::new(Tone::Warning, "something is missing; its cause is not identified")
                 .evidence(format!(
                     "With {} as surrogates the {error} falls {}.",
-                    joined(&diagnosis.stand_ins),
+                    joined(&named(&diagnosis.stand_ins, plant)),
                     from_to(first, last, diagnosis)
                 ))
                 .confidence(format!(
@@ -205,7 +213,7 @@ fn finding(diagnosis: &Diagnosis, plant: Plant) -> Answer {
                 .next(discover)
         }
         Verdict::Unexplained => {
-            let tried = diagnosis.ladder.last().map(|rung| joined(&rung.effects));
+            let tried = diagnosis.ladder.last().map(|rung| joined(&named(&rung.effects, plant)));
             let tried = tried.filter(|tried| !tried.is_empty());
             Answer::new(
                 Tone::Warning,
@@ -305,7 +313,7 @@ fn missing(names: &[String], sets: &[Vec<String>]) -> String {
 }
 
 /// Surrogates in addition to named effects.
-fn surrogates(answer: &mut Answer, diagnosis: &Diagnosis) {
+fn surrogates(answer: &mut Answer, diagnosis: &Diagnosis, plant: Plant) {
     if diagnosis.verdict != Verdict::EffectMissing || diagnosis.stand_ins.is_empty() {
         return;
     }
@@ -313,7 +321,7 @@ fn surrogates(answer: &mut Answer, diagnosis: &Diagnosis) {
     answer.note(format!(
         "{} {} in the model as {}: not significant together with the named effects, or not identifiable on \
              these records.",
-        joined(&diagnosis.stand_ins),
+        joined(&named(&diagnosis.stand_ins, plant)),
         if several { "are" } else { "is" },
         if several { "surrogates" } else { "a surrogate" },
     ));

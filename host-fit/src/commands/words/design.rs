@@ -5,6 +5,7 @@ use closed_loop::{Figures, span};
 use host_fit::design::{
     Case, CaseGroup, Certificate, Margin, Optimum, Proof, RULES, TrackDesign, Weighed, judged,
 };
+use host_fit::picture::{fixed, signed, significant};
 use host_fit::steps::{Design, DesignOutcome};
 
 impl Words for Design {
@@ -45,7 +46,7 @@ fn track_words(design: &TrackDesign, period_s: f64) -> String {
     let law = &design.law;
     let ms = |samples: u32| milliseconds(samples.into(), period_s);
     let mut text = format!(
-        "holds {} inside the interval ({:.3}, {:.3}); duty {:.3} on the model ({:.3} by the formula for u_eq)\n\
+        "target {}, reachable levels {:.3} to {:.3}; duty {:.3} on the model ({:.3} by the formula for u_eq)\n\
          shortest times {} ms open, {} ms closed; predicts up to {} ms ahead{}",
         design.target,
         design.reachable[0],
@@ -195,23 +196,27 @@ fn weighed_words(weighed: &Weighed, is_steady: bool) -> String {
 impl Words for Margin {
     fn words(&self) -> String {
         let percent = |share: f64, open: bool| {
-            let sign = if share < 0.0 { "−" } else { "+" };
-            let beyond = if open { " or more" } else { "" };
-            format!("{sign}{:.0}{beyond}", (100.0 * share.abs()).floor())
+            let (sign, beyond) = match share < 0.0 {
+                true => ("−", " or below"),
+                false => ("+", " or above"),
+            };
+            let beyond = if open { beyond } else { "" };
+            format!("{sign}{:.0} %{beyond}", (100.0 * share.abs()).floor())
         };
         let each = self.intervals.iter().map(|interval| {
             let [low, high] = interval.open;
             format!(
-                "{} {} … {} %",
+                "{} {} … {}",
                 interval.error,
                 percent(interval.low, low),
                 percent(interval.high, high)
             )
         });
         format!(
-            "robustness margin, one error at a time: {}. Inside this margin attachment is kept, and the rms error stays below twice the {:.3} on the model",
+            "robustness margin, one error at a time: {}. Inside this margin attachment is kept, and the rms error stays below twice \
+             that on the model ({} in the shorter runs of the margin)",
             each.collect::<Vec<_>>().join(", "),
-            self.rms
+            significant(self.rms, 3)
         )
     }
 }
@@ -265,9 +270,8 @@ pub(crate) fn trial_caption(proof: &Proof) -> String {
 pub(crate) fn trial_rows(proof: &Proof) -> Vec<Vec<String>> {
     let row = |name: &str, likely: String, kept: &str, f: &Figures, steady: String| {
         let mut cells = vec![name.to_owned(), likely, kept.to_owned()];
-        cells.extend([f.mean, f.rms].map(|v| format!("{v:.3}")));
-        // Adding 0 removes the sign of a rounded −0.
-        cells.push(format!("{:+.3}", (1e3 * f.offset).round() / 1e3 + 0.0));
+        cells.extend([f.mean, f.rms].map(|v| fixed(v, 3, false)));
+        cells.push(signed(f.offset, 3));
         cells.push(format!("{:.3}", f.peak_to_peak));
         cells.push(format!("{:.1}", f.switches_per_s));
         cells.push(format!("{:.3}", f.air));
@@ -278,7 +282,7 @@ pub(crate) fn trial_rows(proof: &Proof) -> Vec<Vec<String>> {
     };
     let cases = proof.cases.iter().map(|case| {
         let kept = if case.kept { "kept" } else { "LOST" };
-        let steady = format!("{:.3}", case.steady);
+        let steady = fixed(case.steady, 3, false);
         row(&case.name, likelihood(case), kept, &case.figures, steady)
     });
     let compared = judged(&proof.compared);

@@ -1,10 +1,11 @@
 //! A diagnosis in words.
 
 use super::{Words, aligned, lines, short};
+use host_fit::data::Plant;
 use host_fit::diagnose::{Diagnosis, ParameterEstimate, RULES, Ranked, Rung};
 use host_fit::indicators::ErrorKind;
 use host_fit::residual::Failures;
-use host_fit::steps::{Finding, Terms, p_bound};
+use host_fit::steps::{Finding, Terms, effect_in_words, p_bound};
 use model_core::effects::spec;
 
 impl Words for Finding {
@@ -18,7 +19,7 @@ impl Words for Finding {
             )
         ));
         if !self.diagnosis.ranking.is_empty() {
-            told.push(format!("\n{}", ranking_table(&self.diagnosis)));
+            told.push(format!("\n{}", ranking_table(&self.diagnosis, self.plant)));
         }
         told.push("\nwhere the model fails".to_owned());
         told.extend(self.failures.iter().flat_map(Failures::describe));
@@ -27,7 +28,10 @@ impl Words for Finding {
         if !self.diagnosis.not_tried.is_empty() {
             told.push("\nnot tried".to_owned());
             let each = self.diagnosis.not_tried.iter();
-            told.extend(each.map(|entry| format!("  {}: {}", entry.effect, entry.reason)));
+            told.extend(each.map(|entry| {
+                let effect = effect_in_words(&entry.effect, self.plant);
+                format!("  {effect}: {}", entry.reason)
+            }));
         }
         lines(told)
     }
@@ -101,23 +105,30 @@ pub(crate) fn ladder_caption(ladder: &[Rung]) -> &'static str {
     }
 }
 
-/// `name value unit (low … high)`, or that it is not identifiable: its interval spans its whole range, or more than the
-/// factor of the rule `diagnose.identified`.
-fn estimate_words(effect: &str, name: &str, p: &ParameterEstimate) -> String {
+/// `name value unit (low … high)`, or that the records do not determine it: its interval spans its whole range, or more
+/// than the factor of the rule `diagnose.identified`.
+fn estimate_words(name: &str, p: &ParameterEstimate) -> String {
     let unit = if p.unit == "-" { "" } else { p.unit.as_str() };
     let space = if unit.is_empty() { "" } else { " " };
-    let card = spec(effect).and_then(|s| s.parameters.iter().find(|card| card.name == name));
+    format!("{name} {}{space}{unit} ({})", short(p.value), interval(p))
+}
+
+/// The 95 % interval of a parameter, or that the records do not determine it.
+pub(crate) fn interval(p: &ParameterEstimate) -> String {
     let wide = p.low > 0.0 && p.high >= RULES.identified * p.low;
-    let whole = card.is_some_and(|card| {
-        let dimensionless = p.unit == "-";
-        dimensionless && p.low <= card.low && p.high >= card.high
-    });
-    let known = p.low.is_finite() && p.high.is_finite() && !wide && !whole;
-    let interval = match known {
+    match p.determined && p.low.is_finite() && p.high.is_finite() && !wide {
         true => format!("{} … {}", short(p.low), short(p.high)),
-        false => "not identifiable".to_owned(),
-    };
-    format!("{name} {}{space}{unit} ({interval})", short(p.value))
+        false => "not determined by these records".to_owned(),
+    }
+}
+
+/// The amplitude of a candidate, if its interval contains 0. The refitted model has a lower error, which the p-value
+/// tests; the interval also has the scatter of the amplitude between records, which is large where the candidate only
+/// imitates another effect.
+fn undetermined_amplitude(r: &Ranked) -> Option<&'static str> {
+    let amplitude = spec(&r.effect)?.amplitude.filter(|card| card.linear)?;
+    let estimate = r.parameters.get(amplitude.parameter)?;
+    (estimate.low <= 0.0 && estimate.high >= 0.0).then_some(amplitude.parameter)
 }
 
 /// A share in percent with one decimal; never "−0.0".
@@ -131,7 +142,15 @@ fn percent(value: f64) -> String {
 }
 
 /// The outcome of a candidate, with the reason.
-fn outcome(r: &Ranked, diagnosis: &Diagnosis) -> String {
+fn outcome(r: &Ranked, diagnosis: &Diagnosis, plant: Plant) -> String {
+    let own = outcome_alone(r, diagnosis, plant);
+    match undetermined_amplitude(r) {
+        Some(amplitude) if r.significant => format!("{own}; its {amplitude} is not determined"),
+        _ => own,
+    }
+}
+
+fn outcome_alone(r: &Ranked, diagnosis: &Diagnosis, plant: Plant) -> String {
     if diagnosis.missing.contains(&r.effect) {
         return "named".to_owned();
     }
@@ -143,7 +162,7 @@ fn outcome(r: &Ranked, diagnosis: &Diagnosis) -> String {
     }
     let set = diagnosis.sets.iter().find(|set| set.contains(&r.effect));
     if let Some(first) = set.and_then(|set| set.first()) {
-        return format!("not distinguishable from {first}");
+        return format!("not distinguishable from {}", effect_in_words(first, plant));
     }
     if !r.refitted {
         return "screened only".to_owned();
@@ -156,12 +175,14 @@ fn outcome(r: &Ranked, diagnosis: &Diagnosis) -> String {
     }
     match diagnosis.missing.as_slice() {
         [] => "significant, but explains too little".to_owned(),
-        named => format!("imitates {}", named.join(" and ")),
+        named if plant == Plant::Flow => format!("imitates {}", named.join(" and ")),
+        [_] => "imitates the named behaviour".to_owned(),
+        _ => "imitates the named behaviours".to_owned(),
     }
 }
 
 /// The candidates, the named ones first: effect, outcome, error reduction, evidence, p, parameters.
-pub(crate) fn ranking_rows(diagnosis: &Diagnosis) -> Vec<Vec<String>> {
+pub(crate) fn ranking_rows(diagnosis: &Diagnosis, plant: Plant) -> Vec<Vec<String>> {
     let row = |r: &Ranked| {
         // Parameters of a candidate without a gain are meaningless.
         let telling = r.significant || diagnosis.missing.contains(&r.effect);
@@ -169,11 +190,11 @@ pub(crate) fn ranking_rows(diagnosis: &Diagnosis) -> Vec<Vec<String>> {
             .parameters
             .iter()
             .filter(|_| telling)
-            .map(|(name, p)| estimate_words(&r.effect, name, p))
+            .map(|(name, p)| estimate_words(name, p))
             .collect();
         vec![
-            r.effect.clone(),
-            outcome(r, diagnosis),
+            effect_in_words(&r.effect, plant),
+            outcome(r, diagnosis, plant),
             percent(r.error_reduction_percent),
             r.gain_nats
                 .map_or_else(|| "–".to_owned(), |nats| format!("{nats:.0}")),
@@ -203,7 +224,7 @@ pub(crate) fn named_first(diagnosis: &Diagnosis) -> Vec<&Ranked> {
     all
 }
 
-fn ranking_table(diagnosis: &Diagnosis) -> String {
+fn ranking_table(diagnosis: &Diagnosis, plant: Plant) -> String {
     let head = [
         "each candidate alone",
         "outcome",
@@ -212,7 +233,7 @@ fn ranking_table(diagnosis: &Diagnosis) -> String {
         "p",
         "parameters (95 % interval)",
     ];
-    aligned_last_left(&head, &ranking_rows(diagnosis))
+    aligned_last_left(&head, &ranking_rows(diagnosis, plant))
 }
 
 /// As [`aligned`], with the last column left-aligned.

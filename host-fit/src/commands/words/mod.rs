@@ -5,7 +5,7 @@ mod design;
 mod finding;
 
 pub(crate) use design::{TRIALS, trial_caption, trial_rows};
-pub(crate) use finding::{ladder_caption, ladder_rows, named_first, ranking_rows};
+pub(crate) use finding::{interval, ladder_caption, ladder_rows, named_first, ranking_rows};
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -249,14 +249,7 @@ pub(crate) const PARAMETERS: [&str; 4] = ["parameter", "unit", "value", "95 % in
 pub(crate) fn parameter_rows(parameters: &BTreeMap<String, ParameterEstimate>) -> Vec<Vec<String>> {
     parameters
         .iter()
-        .map(|(name, p)| {
-            vec![
-                name.clone(),
-                p.unit.clone(),
-                short(p.value),
-                format!("{} … {}", short(p.low), short(p.high)),
-            ]
-        })
+        .map(|(name, p)| vec![name.clone(), p.unit.clone(), short(p.value), interval(p)])
         .collect()
 }
 
@@ -495,10 +488,17 @@ pub(crate) fn score_rows(scores: &Scores) -> Vec<[String; 8]> {
     all
 }
 
+/// Whether a record has the measurement's envelope, `y_min` and `y_max`.
+pub(crate) fn has_envelope(scores: &Scores) -> bool {
+    scores.records.iter().any(|of| of.inside_envelope.is_some())
+}
+
 /// The indicators as an aligned table.
 fn table(scores: &Scores) -> String {
     let rows: Vec<Vec<String>> = score_rows(scores).into_iter().map(Vec::from).collect();
-    aligned(&HEAD, &rows, 2)
+    // The column of the envelope is the last one.
+    let columns = HEAD.len() - usize::from(!has_envelope(scores));
+    aligned(HEAD.get(..columns).unwrap_or(&HEAD), &rows, 2)
 }
 
 /// Rows under a head, the first `left` columns left-aligned, the others right-aligned.

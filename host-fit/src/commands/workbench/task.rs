@@ -5,6 +5,7 @@ use std::sync::Mutex;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
+use host_fit::data::Plant;
 use host_fit::model::Model;
 use host_fit::output::write_atomic;
 use host_fit::search::Snapshot;
@@ -343,8 +344,12 @@ impl Task {
             separation.experiment.write_csv(&path)?;
         }
         if let Some(kept) = kept.as_object_mut() {
-            kept.insert("rows".to_owned(), ranking_rows(&found.diagnosis).into());
-            let picture = page::ranking_picture(&found.diagnosis);
+            // The page makes commands from the names in these rows.
+            kept.insert(
+                "rows".to_owned(),
+                ranking_rows(&found.diagnosis, Plant::Flow).into(),
+            );
+            let picture = page::ranking_picture(&found.diagnosis, found.plant);
             kept.insert("picture".to_owned(), picture.html().into());
             let experiment = separation.map(|s| drawings::experiment_picture(s).html());
             kept.insert("experiment_picture".to_owned(), experiment.into());

@@ -152,7 +152,7 @@ impl fmt::Display for FailureCoordinate {
             Self::LevelOfY => f.write_str("level of y"),
             Self::LevelOfU => f.write_str("level of u"),
             Self::RateOfY => f.write_str("rate of change of y"),
-            Self::Blowing { window_s } => write!(f, "command on in the last {window_s} s"),
+            Self::Blowing { window_s } => write!(f, "duty over the last {window_s} s"),
             Self::MeanInput { window_s } => write!(f, "mean input over the last {window_s} s"),
             Self::TimeInRecord => f.write_str("time in the record"),
             Self::Channel(name) => write!(f, "channel {name}"),
@@ -179,11 +179,11 @@ mod tests {
     #[test]
     fn names_and_stretches_read_well() {
         let long = C::Blowing { window_s: 4.0 };
-        assert_eq!(long.to_string(), "command on in the last 4 s");
+        assert_eq!(long.to_string(), "duty over the last 4 s");
         assert!(long.is_slow(0.001) && !C::Blowing { window_s: 0.25 }.is_slow(0.001));
         assert_eq!(
             long.stretch(0.25, 1.0),
-            "at command on in the last 4 s between 0.25 and 1"
+            "at duty over the last 4 s between 0.25 and 1"
         );
         let rising = C::SinceRisingEdge;
         assert_eq!(rising.stretch(0.0, 0.08), "within 80 ms after rising edges");

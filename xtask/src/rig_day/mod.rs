@@ -198,7 +198,7 @@ pub(crate) fn rig_day(arguments: &[String]) -> Result<()> {
 
     let (held_out, noise) = held_out(&better)?;
     let ((before, air_before), (after, air_after)) = (rms[0], rms[1]);
-    let mut table = String::from("| step | s |\n|---|---|\n");
+    let mut table = String::from("| step, on two cores | duration, s |\n|---|---|\n");
     for (name, seconds) in &day.times {
         let _ = writeln!(table, "| {name} | {seconds:.1} |");
     }
@@ -214,7 +214,7 @@ pub(crate) fn rig_day(arguments: &[String]) -> Result<()> {
         held_out / noise
     );
     println!("{summary}");
-    day.say(&format!("## Result\n\n```\n{summary}\n```\n\nDuration of each step on two cores, in seconds:\n\n{table}"));
+    day.say(&format!("## Result\n\n```\n{summary}\n```\n\n{table}"));
     ensure!(
         effects.iter().any(|e| e == HIDDEN),
         "the effect was not named: {}",

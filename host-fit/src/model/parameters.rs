@@ -76,6 +76,12 @@ impl Model {
         all
     }
 
+    /// Number of parameters as a report states it: those of [`values`](Self::values) that are not 0.
+    #[must_use]
+    pub fn parameter_count(&self) -> usize {
+        self.values().iter().filter(|value| **value != 0.0).count()
+    }
+
     /// The parameter vector, in the order of [`coordinates`](Self::coordinates).
     #[must_use]
     pub fn values(&self) -> Vec<f64> {

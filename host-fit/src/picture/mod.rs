@@ -42,6 +42,7 @@ pub use ladder::{Ladder, LadderRecord, LadderStep, ladder};
 pub use lines::{Line, LinePlot, lines};
 pub use living::{Living, Stretches, packed};
 pub use overlay::{LabelledRun, Overlay, overlay};
+pub use palette::{SERIES_COLOURS, neutral_colour, series_colour};
 pub use ranking::{Candidate, Ranking, ranking};
 pub use region::{Region, Regions, regions};
 pub use report::{Column, Report, Tone, workbench_page};

@@ -35,11 +35,25 @@ const PURPLE: Colour = Colour(170, 68, 153);
 const ORANGE: Colour = Colour(230, 159, 0);
 const SKY: Colour = Colour(86, 180, 233);
 
-const SERIES: [Colour; 6] = [BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY];
+/// Number of colours of series.
+pub const SERIES_COLOURS: usize = 6;
+const SERIES: [Colour; SERIES_COLOURS] = [BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY];
 
 /// Colour of the `index`-th series; repeats after six.
 pub(super) fn series(index: usize) -> Colour {
     SERIES.get(index % SERIES.len()).copied().unwrap_or(BLUE)
+}
+
+/// Colour of the `index`-th series of a picture, as `#RRGGBB`; repeats after six.
+#[must_use]
+pub fn series_colour(index: usize) -> String {
+    series(index).to_string()
+}
+
+/// Colour of a curve that belongs to no series, as `#RRGGBB`.
+#[must_use]
+pub fn neutral_colour() -> String {
+    MUTED.to_string()
 }
 
 /// Light colours with their dark replacements.

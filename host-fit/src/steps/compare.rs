@@ -76,7 +76,7 @@ pub fn compare_several(
         let comparison = comparison.map_err(|error| (name.clone(), error))?;
         Ok(NamedComparison {
             model: name.clone(),
-            parameters: model.values().iter().filter(|value| **value != 0.0).count(),
+            parameters: model.parameter_count(),
             effects: model.effect_names(),
             comparison,
         })

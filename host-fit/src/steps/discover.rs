@@ -200,25 +200,8 @@ fn answer(discovery: &Discovery) -> Answer {
         }
         return answer;
     }
-    let each = discovery.terms.iter().map(|term| {
-        format!(
-            "at the {}, depending on {}",
-            term.place.word(),
-            term.coordinate
-        )
-    });
-    let each: Vec<String> = each.collect();
+    let verdict = headline(&discovery.terms);
     let is_stable = |term: &FoundTerm| term.stability_percent >= 100.0 * DISCOVER.stable;
-    // Other terms together win more often than the best one.
-    let is_undecided = |term: &FoundTerm| term.stability_percent < 50.0;
-    let verdict = match each.as_slice() {
-        _ if discovery.terms.iter().any(is_undecided) => {
-            "something is missing; these records do not determine its place and coordinate"
-                .to_owned()
-        }
-        [one] => format!("a term is missing {one}"),
-        several => format!("terms are missing {}", several.join(" and ")),
-    };
     let (from, to) = (significant(first, 3), significant(last, 3));
     let fall = match known {
         true => format!(
@@ -270,6 +253,32 @@ fn answer(discovery: &Discovery) -> Answer {
         answer.note(separation.words());
     }
     answer
+}
+
+/// The verdict on the terms found. A term that wins in less than half of the resamples has no place and coordinate in it,
+/// because other terms together win more often.
+fn headline(terms: &[FoundTerm]) -> String {
+    let decided = terms.iter().filter(|term| term.stability_percent >= 50.0);
+    let each = decided.map(|term| {
+        format!(
+            "at the {}, depending on {}",
+            term.place.word(),
+            term.coordinate
+        )
+    });
+    let each: Vec<String> = each.collect();
+    let named = match each.as_slice() {
+        [] => {
+            return "something is missing; these records do not determine its place and coordinate"
+                .to_owned();
+        }
+        [one] => format!("a term is missing {one}"),
+        several => format!("terms are missing {}", several.join(" and ")),
+    };
+    match each.len() == terms.len() {
+        true => named,
+        false => format!("{named}; these records do not determine the place of another term"),
+    }
 }
 
 /// Adds a term's formula and its equivalent alternatives to the answer.
@@ -335,5 +344,44 @@ fn spoken(value: f64, unit: &str) -> String {
         "-" => format!("{} %", significant(100.0 * value, 2)),
         "s" => time(value, 2),
         unit => format!("{} in {unit}", significant(value, 2)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::discover::Place;
+    use std::collections::BTreeMap;
+
+    #[test]
+    fn only_a_decided_term_has_a_place_in_the_verdict() {
+        let term = |coordinate: &str, stability_percent: f64| FoundTerm {
+            effect: "found".to_owned(),
+            place: Place::Delay,
+            changes: "change of the delay",
+            coordinate: coordinate.to_owned(),
+            coordinate_unit: "-",
+            excess_taken_percent: 80.0,
+            formula_taken_percent: 80.0,
+            p_value: 1e-6,
+            curve: Vec::new(),
+            unit: "s",
+            resembles: Vec::new(),
+            formula: String::new(),
+            is_formula: false,
+            parameters: BTreeMap::new(),
+            alike: Vec::new(),
+            stability_percent,
+            file: String::new(),
+        };
+        let y = "at the delay, depending on y";
+        assert_eq!(
+            headline(&[term("y", 62.0)]),
+            format!("a term is missing {y}")
+        );
+        let undecided = headline(&[term("y", 38.0)]);
+        assert!(undecided.starts_with("something is missing") && !undecided.contains("delay"));
+        let both = headline(&[term("y", 95.0), term("pulse number", 38.0)]);
+        assert!(both.contains(y) && both.contains("another term") && !both.contains("pulse"));
     }
 }

@@ -438,8 +438,7 @@ pub fn identify(
 }
 
 fn answer(scores: &Scores, beside: &Beside, model: &Model) -> Answer {
-    let parameters = model.values().iter().filter(|value| **value != 0.0).count();
-    level::identified(scores, &beside.fits, parameters)
+    level::identified(scores, &beside.fits, model.parameter_count())
 }
 
 /// The base model with the requested effects, and its scores.

@@ -46,14 +46,16 @@ pub(super) fn at_the_likely_delay(judge: &Judge, judged: Judged, interrupt: &Ato
 
 /// The model with all its delays longer by some samples; `None` if one would be negative.
 fn moved(model: &Model, samples: f64) -> Option<Model> {
+    let Delay::Fixed { delays } = &model.delay else {
+        return None;
+    };
+    let is_negative = |delay: &u16| f64::from(*delay) + samples < 0.0;
+    if delays.iter().any(is_negative) {
+        return None;
+    }
     let mut moved = model.clone();
     moved.delay_later(samples);
-    let sum = |model: &Model| match &model.delay {
-        Delay::Fixed { delays } => delays.iter().map(|delay| f64::from(*delay)).sum(),
-        Delay::Law(_) => f64::NAN,
-    };
-    let count = model.b.len() as f64;
-    (sum(&moved) == sum(model) + count * samples).then_some(moved)
+    Some(moved)
 }
 
 #[cfg(test)]

@@ -9,7 +9,7 @@ use host_fit::data::Use;
 use host_fit::indicators::{ErrorKind, score};
 use host_fit::model::{Delay, Model};
 use host_fit::picture::{
-    Ladder, LadderStep, Picture, ladder, packed, significant, time, workbench_page,
+    Ladder, LadderStep, Picture, ladder, neutral_colour, packed, significant, time, workbench_page,
 };
 use host_fit::steps::{self, Comparison, ImportedSet};
 use model_core::effect::Parameter;
@@ -413,7 +413,7 @@ impl ModelBench {
             return Some(*known);
         }
         let model = Model::load(&self.path(id).ok()?).ok()?;
-        let count = model.values().iter().filter(|value| **value != 0.0).count();
+        let count = model.parameter_count();
         lock(&self.counts).insert(id, count);
         Some(count)
     }
@@ -494,7 +494,7 @@ impl ModelBench {
         let drawn = |(picture, caption): (Picture, String)| json!({"picture": picture.html(), "caption": caption});
         let pairs: Vec<(&str, &[Vec<f64>])> =
             runs.iter().map(|(_, run)| (run.label, run.runs)).collect();
-        let own: Vec<&str> = runs.iter().map(|(id, _)| colours::of(*id)).collect();
+        let own: Vec<String> = runs.iter().map(|(id, _)| colours::of(*id)).collect();
         // The interval in which the earliest of the models has its largest error.
         let worst = pairs
             .first()
@@ -532,7 +532,7 @@ impl ModelBench {
             && let Some(html) = picture.as_str()
         {
             // The first series is the relay.
-            *picture = colours::recoloured(html, &[colours::NO_MODEL, colours::of(id)]).into();
+            *picture = colours::recoloured(html, &[neutral_colour(), colours::of(id)]).into();
         }
         law
     }

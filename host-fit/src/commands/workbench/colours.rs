@@ -1,32 +1,27 @@
 //! The colour of a model, the same in all charts of the page.
 
-/// Colours of the series in pictures, in the order of their index.
-const SERIES: [&str; 6] = [
-    "#0072B2", "#D55E00", "#009E73", "#AA4499", "#E69F00", "#56B4E9",
-];
-
-/// Colour of a curve that belongs to no model of the project.
-pub(super) const NO_MODEL: &str = "#656D76";
+use host_fit::picture::{SERIES_COLOURS, series_colour};
 
 /// Colour index of a model.
 pub(super) fn index(model: u32) -> usize {
-    (model.saturating_sub(1) as usize) % SERIES.len()
+    (model.saturating_sub(1) as usize) % SERIES_COLOURS
 }
 
 /// Colour of a model.
-pub(super) fn of(model: u32) -> &'static str {
-    SERIES.get(index(model)).copied().unwrap_or(NO_MODEL)
+pub(super) fn of(model: u32) -> String {
+    series_colour(index(model))
 }
 
 /// The picture with `colours[i]` in place of the colour of its i-th series.
-pub(super) fn recoloured(picture: &str, colours: &[&str]) -> String {
+pub(super) fn recoloured(picture: &str, colours: &[String]) -> String {
+    let series: Vec<String> = (0..SERIES_COLOURS).map(series_colour).collect();
     let mut parts = picture.split('#');
     let mut text = parts.next().unwrap_or_default().to_owned();
     for part in parts {
-        let mut series = SERIES.iter().zip(colours);
-        let replaced = series.find_map(|(series, colour)| {
+        let mut pairs = series.iter().zip(colours);
+        let replaced = pairs.find_map(|(series, colour)| {
             let rest = part.strip_prefix(series.trim_start_matches('#'))?;
-            Some((*colour, rest))
+            Some((colour, rest))
         });
         match replaced {
             Some((colour, rest)) => {
@@ -48,9 +43,8 @@ mod tests {
     use host_fit::picture::{Line, LinePlot, lines};
 
     #[test]
-    fn the_colours_are_those_of_the_pictures() {
-        for (model, colour) in (1..).zip(SERIES) {
-            assert_eq!((of(model), of(model + 6)), (colour, colour));
+    fn a_model_has_the_colour_of_its_index_in_pictures() {
+        for model in 1..=6 {
             let drawn = [Line {
                 label: "a model",
                 points: &[(0.0, 0.0), (1.0, 1.0)],
@@ -65,7 +59,13 @@ mod tests {
                 band: None,
                 log_x: false,
             });
-            assert!(picture.contains(colour), "{colour}");
+            let others = (1..=6).filter(|other| *other != model);
+            assert!(picture.contains(&of(model)), "{model}");
+            assert!(
+                others
+                    .into_iter()
+                    .all(|other| !picture.contains(&of(other)))
+            );
         }
     }
 

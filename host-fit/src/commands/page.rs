@@ -652,14 +652,16 @@ pub(super) fn failures_picture(failures: &Failures) -> Picture {
 fn report_candidates(report: &mut Report, found: &Finding) {
     let diagnosis = &found.diagnosis;
     report.section(&step_by_step(diagnosis.held_out_by.compared()));
+    report.columns();
     if diagnosis.ladder.len() > 2 {
         report.figure(&ladder_picture(diagnosis), "");
     }
-    report.table(
+    report.cell().table(
         ladder_caption(&diagnosis.ladder),
         &LADDER,
         &ladder_rows(&diagnosis.ladder),
     );
+    report.end_columns().end_columns();
     if !diagnosis.ranking.is_empty() {
         report.section("Candidates");
         report.figure(

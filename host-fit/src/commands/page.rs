@@ -21,9 +21,9 @@ use super::drawings::{
 use super::page_parts::{Run, Stretch, card, checks, stretch_picture, worst_stretch};
 use super::tried::Tried;
 use super::words::{
-    PARAMETERS, SIDE_BY_SIDE, TRIALS, Words, describe, dropped_terms, has_envelope, ladder_caption,
-    ladder_rows, named_first, parameter_rows, ranking_rows, role_name, score_rows,
-    side_by_side_rows, trial_caption, trial_rows,
+    PARAMETERS, SIDE_BY_SIDE, TRIALS, Words, describe, dropped_terms, has_envelope, is_told,
+    ladder_caption, ladder_rows, named_first, parameter_rows, ranking_rows, role_name, score_rows,
+    screened_only, side_by_side_rows, trial_caption, trial_rows,
 };
 
 /// The page of a comparison, made by `command`.
@@ -664,23 +664,29 @@ fn report_candidates(report: &mut Report, found: &Finding) {
     report.end_columns().end_columns();
     if !diagnosis.ranking.is_empty() {
         report.section("Candidates");
-        report.figure(
-            &ranking_picture(diagnosis, found.plant),
-            &candidates_caption(diagnosis),
-        );
-        report.table(
-            "Nats: ln of the Bayes factor of the model with the effect against the model without it. p is family-wise: \
-             it is corrected for all models that were tried. Screened only: the first-order estimate was too small to refit.",
-            &[
-                Column::Text("effect"),
-                Column::Text("outcome"),
-                Column::Number("error falls"),
-                Column::Number("nats"),
-                Column::Number("p"),
-                Column::Text("parameters (95 % interval)"),
-            ],
-            &ranking_rows(diagnosis, found.plant),
-        );
+        let rows = ranking_rows(diagnosis, found.plant);
+        if !rows.is_empty() {
+            report.figure(
+                &ranking_picture(diagnosis, found.plant),
+                &candidates_caption(diagnosis),
+            );
+            report.table(
+                "Nats: ln of the Bayes factor of the model with the effect against the model without it. p is \
+                 family-wise: it is corrected for all models that were tried.",
+                &[
+                    Column::Text("effect"),
+                    Column::Text("outcome"),
+                    Column::Number("error falls"),
+                    Column::Number("nats"),
+                    Column::Number("p"),
+                    Column::Text("parameters (95 % interval)"),
+                ],
+                &rows,
+            );
+        }
+        if let Some(screened) = screened_only(diagnosis, found.plant) {
+            report.paragraph(&screened);
+        }
     }
     if !found.detectable.is_empty() {
         report.section("Detectable effects");
@@ -717,7 +723,8 @@ fn candidates_caption(diagnosis: &Diagnosis) -> String {
 /// Every candidate's error.
 pub(super) fn ranking_picture(diagnosis: &Diagnosis, plant: Plant) -> Picture {
     let kind = diagnosis.held_out_by.judged();
-    let ranked = named_first(diagnosis);
+    let ranked = named_first(diagnosis).into_iter();
+    let ranked: Vec<_> = ranked.filter(|r| is_told(r, diagnosis)).collect();
     let names: Vec<String> = ranked
         .iter()
         .map(|r| effect_in_words(&r.effect, plant))
@@ -733,7 +740,6 @@ pub(super) fn ranking_picture(diagnosis: &Diagnosis, plant: Plant) -> Picture {
             accepted: diagnosis.missing.contains(&r.effect),
             note: match r.significant || diagnosis.missing.contains(&r.effect) {
                 true => "",
-                false if !r.refitted => "screened only",
                 false if r.p_value > RULES.level => "not significant",
                 false => "below the practical margin",
             },

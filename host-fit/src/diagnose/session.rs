@@ -38,6 +38,9 @@ struct Way {
     /// Number of significant effects. Effects that a second copy of another effect replaces, and effects whose
     /// parameters are not identifiable, are not counted.
     proven: usize,
+    /// A step with fewer effects and a clearly smaller error than the model with all effects: that one has not
+    /// converged.
+    better: Option<Hypothesis>,
 }
 
 /// A base model, and the result of adding each effect to it.
@@ -110,21 +113,29 @@ impl Session<'_> {
         let alone = compared.best_alone();
         let alone = alone.filter(|alone| alone.score() < named.score());
         let concluded = |best: &Hypothesis| self.concluded(best, &found);
+        let mut conclusion = alone
+            .map(concluded)
+            .filter(|conclusion| !conclusion.effects.is_empty())
+            .unwrap_or_else(|| concluded(&named));
+        // A fit with fewer effects may have converged further; then it is the result.
+        let way = loop {
+            let mut way = self.way(&conclusion, &found.root);
+            match way.better.take() {
+                Some(better) => conclusion = concluded(&better),
+                None => break way,
+            }
+        };
         let Conclusion {
             verdict,
             model: last,
             effects,
             p_value,
-        } = alone
-            .map(concluded)
-            .filter(|conclusion| !conclusion.effects.is_empty())
-            .unwrap_or_else(|| concluded(&named));
+        } = conclusion;
         if effects.is_empty() && !named.is_bare() {
             compared = self.compared(&last, &found);
         }
         let Compared { context, others } = compared;
         let claims = verdict == Verdict::EffectMissing;
-        let way = self.way(&last, effects, &found.root, claims);
         let order = way.order;
         let refitted = first[1].step.clone();
         let mut ladder = first.to_vec();
@@ -293,23 +304,22 @@ impl Session<'_> {
         Compared { context, others }
     }
 
-    /// The ladder from no effect to `last`, with one more of its `effects` at each step, the least important last.
-    /// The significance of each is tested only if effects are claimed.
-    fn way(
-        &self,
-        last: &Hypothesis,
-        effects: Vec<&'static Spec>,
-        root: &Hypothesis,
-        claims: bool,
-    ) -> Way {
-        let mut left = effects;
+    /// The ladder from no effect to the model of the conclusion, with one more of its effects at each step, the least
+    /// important last. The significance of each is tested only if effects are claimed.
+    fn way(&self, conclusion: &Conclusion, root: &Hypothesis) -> Way {
+        let last = &conclusion.model;
+        let claims = conclusion.verdict == Verdict::EffectMissing;
+        let mut left = conclusion.effects.clone();
         let mut current = last.clone();
         let mut later: Vec<(&'static Spec, Hypothesis)> = Vec::new();
-        let mut unproven = 0;
+        let (mut unproven, mut better) = (0, None);
         while left.len() > 1 {
             let Some((spec, lesser)) = self.without_the_least(&current, root) else {
                 break;
             };
+            if lesser.judged.rmse() < (1.0 - RULES.worthwhile) * last.judged.rmse() {
+                better = Some(lesser.clone());
+            }
             left.retain(|other| other.name != spec.name);
             let stands_in = || self.does_as_well_twice(&left, &lesser, &current);
             if claims && unproven == later.len() && stands_in() {
@@ -331,6 +341,7 @@ impl Session<'_> {
             proven: left.len() - unproven,
             order: left,
             rungs,
+            better,
         }
     }
 }
@@ -409,6 +420,19 @@ mod tests {
         let names: Vec<&str> = claimed.effects.iter().map(|spec| spec.name).collect();
         assert_eq!(names, ["thermal-drift"]);
         assert_eq!(claimed.verdict, Verdict::EffectMissing);
+        // A model that has not converged with both effects gives way to the one with the drift alone.
+        let mut stuck = searched.best.clone();
+        stuck.judged.held_out = bare.judged.held_out.clone();
+        let drift_and = |model: &Hypothesis| Conclusion {
+            verdict: Verdict::EffectMissing,
+            model: model.clone(),
+            effects: model.terms.iter().filter_map(Term::effect).collect(),
+            p_value: None,
+        };
+        let better = |model| usual.way(&drift_and(model), &found.root).better;
+        assert!(better(&searched.best).is_none());
+        let better = better(&stuck).expect("the drift alone");
+        assert_eq!(better.words(), "thermal-drift");
         // The verdict refers to the resulting model: nothing is missing in a given model at the noise level.
         let verdict = |session: Session<'_>| session.concluded(&bare, &found).verdict;
         assert_eq!(verdict(usual), Verdict::Unexplained);

@@ -4,7 +4,7 @@ use serde::ser::{Serialize, SerializeMap, Serializer};
 use std::fmt;
 
 use super::rules::RULES;
-use crate::picture::significant;
+use crate::picture::{readable_time, significant};
 
 /// A coordinate along which the error of a free run is split.
 ///
@@ -135,13 +135,14 @@ impl FailureCoordinate {
 }
 
 fn after_edges(which: &str, from: f64, to: f64) -> String {
-    let milliseconds = |s: f64| significant(1000.0 * s, 3);
-    let to = milliseconds(to);
+    let (end, unit) = readable_time(to);
+    let in_unit = |seconds: f64| significant(seconds * end / to, 3);
+    let last = in_unit(to);
     if from <= 0.0 {
-        format!("within {to} ms after {which} edges")
-    } else {
-        format!("{} to {to} ms after {which} edges", milliseconds(from))
+        return format!("within {last} {unit} after {which} edges");
     }
+    // Both ends in the unit of the later one.
+    format!("{} to {last} {unit} after {which} edges", in_unit(from))
 }
 
 impl fmt::Display for FailureCoordinate {
@@ -188,6 +189,7 @@ mod tests {
         let rising = C::SinceRisingEdge;
         assert_eq!(rising.stretch(0.0, 0.08), "within 80 ms after rising edges");
         assert_eq!(rising.stretch(0.02, 0.08), "20 to 80 ms after rising edges");
+        assert_eq!(rising.stretch(0.5, 20.0), "0.5 to 20 s after rising edges");
         let third = C::PulseInCycle { cycle: 3 };
         assert_eq!(
             third.stretch(0.0, 0.0),

@@ -95,17 +95,21 @@ fn command_period(u: &[f64]) -> Option<usize> {
     periodic.then_some(middle)
 }
 
-/// σ² of white noise from third differences, in which smooth motion is small; by the median, which edges do
-/// not affect.
+/// σ² of white noise from third differences, in which smooth motion is small: from the mean size of the middle of
+/// their distribution, which edges do not affect. Readings with a coarse resolution give a few sizes only, of which the
+/// median would be one.
 fn by_scatter(e: &[f64]) -> f64 {
-    let mut squares: Vec<f64> = e
+    let mut sizes: Vec<f64> = e
         .windows(4)
-        .map(|w| w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0])
-        .map(|d| d * d / 20.0)
+        .map(|w| (w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0]).abs())
         .collect();
-    squares.sort_by(f64::total_cmp);
-    // The median of χ² with one degree of freedom is 0.4549.
-    squares.get(squares.len() / 2).map_or(0.0, |m| m / 0.4549)
+    sizes.sort_by(f64::total_cmp);
+    let (first, last) = (sizes.len() * 3 / 10, sizes.len() * 7 / 10);
+    let middle = &sizes[first..last.max(first + 1).min(sizes.len())];
+    let mean = middle.iter().sum::<f64>() / middle.len().max(1) as f64;
+    // The mean size of a normal variable between the 30th and the 70th percentile of its size is 0.6862 σ; the third
+    // difference of white noise has √20 times its σ.
+    (mean / 0.6862).powi(2) / 20.0
 }
 
 impl Errors {
@@ -162,5 +166,29 @@ mod tests {
         let sd = by_scatter(&record(false).y).sqrt();
         assert!((sd / 0.1 - 1.0).abs() < 0.06, "{sd}");
         assert_eq!(by_scatter(&[]), 0.0);
+        assert_eq!(
+            by_scatter(&[1.0, 2.0, 4.0, 8.0]),
+            (1.0 / 0.6862_f64).powi(2) / 20.0
+        );
+    }
+
+    /// A logger that rounds to once or twice the noise. The median of the differences would be 5 % too small and 30 % too
+    /// large.
+    #[test]
+    fn a_coarse_resolution_does_not_change_the_noise_level() {
+        let mut rng = ChaCha8Rng::seed_from_u64(7);
+        for resolution in [1.0, 1.5, 2.0] {
+            let (mut e, mut sum) = (Vec::new(), 0.0);
+            for k in 0..20_000 {
+                // The sum of twelve uniform numbers is almost normal.
+                let noise: f64 = (0..12).map(|_| rng.random_range(-0.5..0.5)).sum();
+                let smooth = 30.0 * (f64::from(k) / 97.0).sin();
+                let read = ((smooth + noise) / resolution).round() * resolution;
+                e.push(read - smooth);
+                sum += (read - smooth).powi(2);
+            }
+            let ratio = (by_scatter(&e) / (sum / e.len() as f64)).sqrt();
+            assert!((ratio - 1.0).abs() < 0.03, "{resolution}: {ratio}");
+        }
     }
 }

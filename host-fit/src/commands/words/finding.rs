@@ -19,7 +19,13 @@ impl Words for Finding {
             )
         ));
         if !self.diagnosis.ranking.is_empty() {
-            told.push(format!("\n{}", ranking_table(&self.diagnosis, self.plant)));
+            let (diagnosis, plant) = (&self.diagnosis, self.plant);
+            let rows = ranking_rows(diagnosis, plant);
+            if !rows.is_empty() {
+                told.push(format!("\n{}", ranking_table(&rows)));
+            }
+            let screened = screened_only(diagnosis, plant);
+            told.extend(screened.map(|words| format!("\n{words}")));
         }
         told.push("\nwhere the model fails".to_owned());
         told.extend(self.failures.iter().flat_map(Failures::describe));
@@ -152,7 +158,12 @@ fn outcome(r: &Ranked, diagnosis: &Diagnosis, plant: Plant) -> String {
 
 fn outcome_alone(r: &Ranked, diagnosis: &Diagnosis, plant: Plant) -> String {
     if diagnosis.missing.contains(&r.effect) {
-        return "named".to_owned();
+        let others = diagnosis.missing.iter().filter(|name| **name != r.effect);
+        let others: Vec<String> = others.map(|name| effect_in_words(name, plant)).collect();
+        return match r.refitted && r.p_value > RULES.level && !others.is_empty() {
+            true => format!("named beside {}", others.join(" and ")),
+            false => "named".to_owned(),
+        };
     }
     if diagnosis.certified.contains(&r.effect) {
         return "certified".to_owned();
@@ -181,32 +192,72 @@ fn outcome_alone(r: &Ranked, diagnosis: &Diagnosis, plant: Plant) -> String {
     }
 }
 
-/// The candidates, the named ones first: effect, outcome, error reduction, evidence, p, parameters.
-pub(crate) fn ranking_rows(diagnosis: &Diagnosis, plant: Plant) -> Vec<Vec<String>> {
-    let row = |r: &Ranked| {
-        // Parameters of a candidate without a gain are meaningless.
-        let telling = r.significant || diagnosis.missing.contains(&r.effect);
-        let parameters: Vec<String> = r
-            .parameters
-            .iter()
-            .filter(|_| telling)
-            .map(|(name, p)| estimate_words(name, p))
-            .collect();
-        vec![
-            effect_in_words(&r.effect, plant),
-            outcome(r, diagnosis, plant),
-            percent(r.error_reduction_percent),
-            r.gain_nats
-                .map_or_else(|| "–".to_owned(), |nats| format!("{nats:.0}")),
-            if r.refitted {
-                p_bound(r.p_value)
-            } else {
-                "–".to_owned()
-            },
-            parameters.join(", "),
-        ]
+/// Whether a candidate was fitted, or is part of the answer.
+pub(crate) fn is_told(r: &Ranked, diagnosis: &Diagnosis) -> bool {
+    let answer = [
+        &diagnosis.missing,
+        &diagnosis.certified,
+        &diagnosis.stand_ins,
+    ];
+    let sets = diagnosis.sets.iter().flatten();
+    let mut named = answer.into_iter().flatten().chain(sets);
+    r.refitted || named.any(|name| *name == r.effect)
+}
+
+/// The candidates of which only a first-order estimate exists, in one sentence; `None` if there are none.
+pub(crate) fn screened_only(diagnosis: &Diagnosis, plant: Plant) -> Option<String> {
+    let all = diagnosis.ranking.iter();
+    let screened: Vec<&Ranked> = all.filter(|r| !is_told(r, diagnosis)).collect();
+    let fall = |r: &&&Ranked| r.error_reduction_percent;
+    let most = screened.iter().max_by(|a, b| fall(a).total_cmp(&fall(b)))?;
+    let name = effect_in_words(&most.effect, plant);
+    let lowers = match percent(most.error_reduction_percent.max(0.0)).as_str() {
+        "0.0 %" => "does not lower the error".to_owned(),
+        share => format!("lowers the error by {share}"),
     };
+    Some(match screened.len() {
+        1 => format!("{name} was screened only: by the first-order estimate it {lowers}."),
+        count => format!(
+            "{count} candidates were screened only: by the first-order estimate, the best of them ({name}) {lowers}."
+        ),
+    })
+}
+
+/// Candidates, the named ones first: effect, outcome, error reduction, evidence, p, parameters.
+pub(crate) fn every_candidate(diagnosis: &Diagnosis, plant: Plant) -> Vec<Vec<String>> {
+    let row = |r| candidate_row(r, diagnosis, plant);
     named_first(diagnosis).into_iter().map(row).collect()
+}
+
+/// As [`every_candidate`], without those of which only a first-order estimate exists.
+pub(crate) fn ranking_rows(diagnosis: &Diagnosis, plant: Plant) -> Vec<Vec<String>> {
+    let told = named_first(diagnosis).into_iter();
+    let told = told.filter(|r| is_told(r, diagnosis));
+    told.map(|r| candidate_row(r, diagnosis, plant)).collect()
+}
+
+fn candidate_row(r: &Ranked, diagnosis: &Diagnosis, plant: Plant) -> Vec<String> {
+    // Parameters of a candidate without a gain are meaningless.
+    let telling = r.significant || diagnosis.missing.contains(&r.effect);
+    let parameters: Vec<String> = r
+        .parameters
+        .iter()
+        .filter(|_| telling)
+        .map(|(name, p)| estimate_words(name, p))
+        .collect();
+    vec![
+        effect_in_words(&r.effect, plant),
+        outcome(r, diagnosis, plant),
+        percent(r.error_reduction_percent),
+        r.gain_nats
+            .map_or_else(|| "–".to_owned(), |nats| format!("{nats:.0}")),
+        if r.refitted {
+            p_bound(r.p_value)
+        } else {
+            "–".to_owned()
+        },
+        parameters.join(", "),
+    ]
 }
 
 /// The ranking with the named effects first, then the surrogates, then the others, each in their order.
@@ -224,7 +275,7 @@ pub(crate) fn named_first(diagnosis: &Diagnosis) -> Vec<&Ranked> {
     all
 }
 
-fn ranking_table(diagnosis: &Diagnosis, plant: Plant) -> String {
+fn ranking_table(rows: &[Vec<String>]) -> String {
     let head = [
         "each candidate alone",
         "outcome",
@@ -233,7 +284,7 @@ fn ranking_table(diagnosis: &Diagnosis, plant: Plant) -> String {
         "p",
         "parameters (95 % interval)",
     ];
-    aligned_last_left(&head, &ranking_rows(diagnosis, plant))
+    aligned_last_left(&head, rows)
 }
 
 /// As [`aligned`], with the last column left-aligned.

@@ -5,7 +5,10 @@ mod design;
 mod finding;
 
 pub(crate) use design::{TRIALS, trial_caption, trial_rows};
-pub(crate) use finding::{interval, ladder_caption, ladder_rows, named_first, ranking_rows};
+pub(crate) use finding::{
+    every_candidate, interval, is_told, ladder_caption, ladder_rows, named_first, ranking_rows,
+    screened_only,
+};
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;

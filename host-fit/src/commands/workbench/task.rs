@@ -17,7 +17,7 @@ use super::bench::{Made, ModelBench, lock};
 use super::data::Data;
 use super::request::{Command, Line, Request};
 use crate::commands::paragraph;
-use crate::commands::words::{TRIALS, Words, ranking_rows, trial_caption, trial_rows};
+use crate::commands::words::{TRIALS, Words, every_candidate, trial_caption, trial_rows};
 use crate::commands::{design, diagnose, discover, drawings, extend, identify, import, page};
 
 /// A task that can be started.
@@ -347,7 +347,7 @@ impl Task {
             // The page makes commands from the names in these rows.
             kept.insert(
                 "rows".to_owned(),
-                ranking_rows(&found.diagnosis, Plant::Flow).into(),
+                every_candidate(&found.diagnosis, Plant::Flow).into(),
             );
             let picture = page::ranking_picture(&found.diagnosis, found.plant);
             kept.insert("picture".to_owned(), picture.html().into());

@@ -56,23 +56,29 @@ pub(crate) struct Plants {
 }
 
 impl Plants {
-    /// The plants for `model`, repeatable by `seed`.
+    /// The plants for `model`, repeatable by `seed`. `noise` is that of the sensor as a multiple of a typical hot film's.
     ///
     /// # Errors
     /// The model does not settle, or its constants are not physical.
-    pub(crate) fn of(model: &Model, seed: u64) -> anyhow::Result<Self> {
+    pub(crate) fn of(model: &Model, noise: f64, seed: u64) -> anyhow::Result<Self> {
         let units = Units {
             time: model.sample_period_s / SAMPLE_PERIOD_S,
             ..units_of_order_one(model)
         };
         let (plant, left_out) = nearest_plant(&units.model_in(model))?;
+        let usual = Circumstances {
+            noise,
+            lost: Lost::default(),
+            seed,
+            units,
+        };
         let mut stress = vec![trial(
             CaseGroup::Plant,
             "continuous-time plant, noisy sensor",
             &plant,
-            Circumstances::usual(seed, units),
+            usual,
         )?];
-        stress.extend(others(&plant, seed, units)?);
+        stress.extend(others(&plant, usual)?);
         Ok(Self { stress, left_out })
     }
 }
@@ -170,15 +176,6 @@ struct Circumstances {
 }
 
 impl Circumstances {
-    fn usual(seed: u64, units: Units) -> Self {
-        Self {
-            noise: 1.0,
-            lost: Lost::default(),
-            seed,
-            units,
-        }
-    }
-
     /// The model's sample period, s.
     fn sample_period_s(&self) -> f64 {
         SAMPLE_PERIOD_S * self.units.time
@@ -216,8 +213,8 @@ fn trial(
 }
 
 /// The plant with every effect of the catalogue in turn, then under conditions beyond the design.
-fn others(plant: &PlantSpec, seed: u64, units: Units) -> anyhow::Result<Vec<Trial<Clocked>>> {
-    let usual = Circumstances::usual(seed, units);
+fn others(plant: &PlantSpec, usual: Circumstances) -> anyhow::Result<Vec<Trial<Clocked>>> {
+    let Circumstances { seed, units, .. } = usual;
     let mut others = Vec::new();
     for (index, name) in Effect::NAMES.iter().enumerate() {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -254,7 +251,7 @@ fn others(plant: &PlantSpec, seed: u64, units: Units) -> anyhow::Result<Vec<Tria
         ..plant.base
     };
     let noisier = Circumstances {
-        noise: 3.0,
+        noise: 3.0 * usual.noise,
         ..usual
     };
     let losing = |share: f64, stretch: Option<(usize, usize)>| Circumstances {
@@ -333,7 +330,7 @@ mod tests {
             ..TrackRequest::holding(target)
         };
         let law = track(model, &request).unwrap().law;
-        let plants = Plants::of(model, seed).unwrap();
+        let plants = Plants::of(model, 1.0, seed).unwrap();
         let trials = Trials {
             possible: &[],
             stress: &plants.stress,

@@ -14,7 +14,7 @@ use super::average::{not_negative, positive};
 use super::drawings::{margin_picture, proof_picture};
 use super::load::shell_word;
 use super::time_span::TimeSpan;
-use super::tried::Tried;
+use super::tried::{NoiseFrom, Tried};
 use super::{Console, check_outputs, page, rig_constants};
 use crate::plants::Plants;
 
@@ -256,7 +256,17 @@ impl Args {
             rig_constants::same_period(rig, model)
                 .map_err(|reason| anyhow!("{}: {reason}", file.display()))?;
         }
-        let request = self.request(rig.as_ref(), model)?;
+        let mut request = self.request(rig.as_ref(), model)?;
+        let mut noise_from = NoiseFrom::HotFilm;
+        if let DesignRequest::Track(track) = &mut request {
+            if track.slow_noise.is_some() {
+                noise_from = NoiseFrom::Rig;
+            } else if let Some(set) = set
+                && let Some(noise) = steps::slow_noise(model, set)?
+            {
+                (track.slow_noise, noise_from) = (Some(noise), NoiseFrom::Records);
+            }
+        }
         let design = steps::design(model, &request)?;
         let mut notes = Vec::new();
         let possible = match set {
@@ -271,7 +281,7 @@ impl Args {
             }
         };
         // A law is returned even if the simulator has no plant for stress trials.
-        let stress = match Plants::of(model, self.seed) {
+        let stress = match Plants::of(model, design.noise, self.seed) {
             Ok(plants) => {
                 notes.extend(plants.left_out);
                 plants.stress
@@ -300,6 +310,7 @@ impl Args {
             proof,
             targets,
             not_tried: notes,
+            noise_from,
             file: shell_word(&self.output),
             answer: Answer::default(),
         }

@@ -4,7 +4,9 @@ use closed_loop::{Figures, span};
 use host_fit::design::{Case, CaseGroup, Margin, Proof, RULES};
 use host_fit::picture::significant;
 use host_fit::steps::{Answer, Design, DesignOutcome, TargetVerdict, Tone};
+use model_core::control::period::loop_period_us;
 use serde::Serialize;
+use std::fmt;
 
 use super::words::Words;
 
@@ -22,11 +24,35 @@ pub(super) struct Tried {
     pub(super) targets: Vec<TargetVerdict>,
     /// Trials that were not possible, one sentence each.
     pub(super) not_tried: Vec<String>,
+    /// Where the sensor noise of the trials comes from.
+    pub(super) noise_from: NoiseFrom,
     /// The file of the law, quoted for a shell.
     #[serde(skip)]
     pub(super) file: String,
     /// The answer of these trials.
     pub(super) answer: Answer,
+}
+
+/// Where the sensor noise of trials comes from.
+#[derive(Clone, Copy, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub(super) enum NoiseFrom {
+    /// The calibrated rig.
+    Rig,
+    /// The error of the model on the records.
+    Records,
+    /// The records are averages, or there are none: a typical hot film.
+    HotFilm,
+}
+
+impl fmt::Display for NoiseFrom {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Rig => "measured by `record --calibrate`",
+            Self::Records => "the error of the model on the records",
+            Self::HotFilm => "as of a hot film",
+        })
+    }
 }
 
 impl Tried {
@@ -89,10 +115,13 @@ impl Tried {
             let [from, until] = [RULES.trial_from, RULES.trial]
                 .map(|samples| significant(span(samples, period_s) as f64 * period_s, 3));
             format!(
-                " On the model with a noisy sensor, from {from} to {until} s: mean y {}, rms error {}, {:.1} switches/s.",
+                " On the model with sensor noise of {} rms ({}), from {from} to {until} s: mean y {}, rms error {}, {} \
+                 switches/s.",
+                significant(self.design.noise_rms(), 2),
+                self.noise_from,
                 significant(figures.mean, 3),
                 significant(figures.rms, 3),
-                figures.switches_per_s
+                significant(figures.switches_per_s, 2)
             )
         });
         let margin = self.margin.as_ref().map(Words::words);
@@ -102,7 +131,11 @@ impl Tried {
                 format!("{}.", capitalised(margin.trim_end_matches('.')))
             }))
             .next(match held {
-                Held::Yes => format!("host-fit codegen {} -o identified.rs", self.file),
+                Held::Yes if loop_period_us(self.design.sample_period_s).is_some() => {
+                    format!("host-fit codegen {} -o identified.rs", self.file)
+                }
+                // The boards' timers are not made for slow loops.
+                Held::Yes => format!("host-fit codegen {} --lang c -o controlled.c", self.file),
                 // The remark on the shortest times says what to change; no command is known to hold the target.
                 Held::No | Held::NoSwitch => String::new(),
             });

@@ -1,11 +1,15 @@
 //! Requirements of a law on its model, and why no law was designed.
 
 use crate::model::{Model, Start};
+use crate::picture::time;
 use crate::terms::Units;
 use model_core::control::Unusable;
-use model_core::control::period::{LONGEST_US, SHORTEST_US, loop_period_us};
+use model_core::control::period::SHORTEST_US;
 use model_core::control::{Reachable, Unreachable};
 use thiserror::Error;
+
+/// Longest sample period of a law, s. The timers of the boards have a lower limit.
+const LONGEST_S: f64 = 3600.0;
 
 /// Why no law was designed.
 #[derive(Clone, Debug, Error, PartialEq)]
@@ -25,11 +29,11 @@ pub enum DesignError {
         "the free run of the model starts from measurements, not from rest; identify it on records that start at rest"
     )]
     NotFromRest,
-    /// The model's sample period is outside the range of a control loop.
+    /// The model's sample period is outside the range of a law.
     #[error(
-        "key `sample_period_s`: a control loop runs with a sample period of {} to {} ms, and the model has \
-        {} ms; identify on records with a sample period within that range",
-        f64::from(SHORTEST_US) * 1e-3, f64::from(LONGEST_US) * 1e-3, milliseconds(*.0)
+        "key `sample_period_s`: a law runs with a sample period of 0.2 ms to 1 h, and the model has {}; \
+        identify on records with a sample period within that range",
+        time(*.0, 3)
     )]
     SamplePeriod(f64),
     /// The model does not settle under a constant command.
@@ -111,19 +115,15 @@ impl DesignError {
     }
 }
 
-/// A period for messages, ms, rounded to remove binary representation errors.
-fn milliseconds(period_s: f64) -> f64 {
-    (period_s * 1e9).round() / 1e6
-}
-
-/// Rejects a sample period outside the range of a control loop; checked before any work.
+/// Rejects a sample period outside the range of a law; checked before any work.
 ///
 /// # Errors
 /// [`DesignError::SamplePeriod`].
 pub fn check_period(model: &Model) -> Result<(), DesignError> {
-    match loop_period_us(model.sample_period_s) {
-        Some(_) => Ok(()),
-        None => Err(DesignError::SamplePeriod(model.sample_period_s)),
+    let shortest_s = 1e-6 * f64::from(SHORTEST_US);
+    match (shortest_s * (1.0 - 1e-3)..=LONGEST_S).contains(&model.sample_period_s) {
+        true => Ok(()),
+        false => Err(DesignError::SamplePeriod(model.sample_period_s)),
     }
 }
 
@@ -146,16 +146,12 @@ mod tests {
             sample_period_s,
             ..Model::default()
         };
-        for period in [2e-4, 1e-3, 0.0123, 0.1, 0.1 + 1e-9] {
+        for period in [2e-4, 1e-3, 0.0123, 0.1, 2.0, 3600.0] {
             assert_eq!(check_period(&at(period)), Ok(()), "{period}");
         }
-        for (period, said) in [
-            (1e-4, "has 0.1 ms"),
-            (0.25, "has 250 ms"),
-            (60.0, "has 60000 ms"),
-        ] {
+        for (period, said) in [(1e-4, "has 100 µs"), (7200.0, "has 7200 s")] {
             let error = check_period(&at(period)).unwrap_err().to_string();
-            for word in ["`sample_period_s`", "0.2 to 100 ms", said, "identify"] {
+            for word in ["`sample_period_s`", "0.2 ms to 1 h", said, "identify"] {
                 assert!(error.contains(word), "{error}");
             }
         }

@@ -6,6 +6,7 @@ use super::error::{DesignError, check};
 use super::rules::RULES;
 use super::steady::{Steady, steady, time_constants};
 use crate::model::{Delay, Model, Track};
+use crate::picture::time;
 use closed_loop::{AHEAD, Figures, ModelFlow, TrackingController, run};
 use model_core::control::Unusable;
 use model_core::control::budget::{Air, Budget};
@@ -160,10 +161,9 @@ pub fn track(model: &Model, request: &TrackRequest) -> Result<TrackDesign, Desig
         }
     }
     if hold.on > asked.on || hold.off > asked.off {
-        let [on, off] =
-            [hold.on, hold.off].map(|samples| (1e6 * f64::from(samples) * period_s).round() / 1e3);
+        let [on, off] = [hold.on, hold.off].map(|samples| time(f64::from(samples) * period_s, 4));
         remarks.push(format!(
-            "shortest times are {on} ms on and {off} ms off: shorter pulses may not reach the flow \
+            "shortest times are {on} on and {off} off: shorter pulses may not reach the flow \
             completely"
         ));
     }
@@ -256,12 +256,12 @@ pub fn track(model: &Model, request: &TrackRequest) -> Result<TrackDesign, Desig
     let final_figures = duty_of(&law)?;
     duty = final_figures.air;
     if final_figures.switches_per_s == 0.0 {
-        let ms = |samples: u32| (1e6 * f64::from(samples) * period_s).round() / 1e3;
+        let length = |samples: u32| time(f64::from(samples) * period_s, 4);
         remarks.push(format!(
-            "on the model the valve does not switch after the start: shortest times of {} ms open and {} ms closed \
+            "on the model the valve does not switch after the start: shortest times of {} open and {} closed \
              are too long for its response; choose another target, or give shorter times (`--min-on`, `--min-off`) if the valve can follow them",
-            ms(law.hold.on),
-            ms(law.hold.off)
+            length(law.hold.on),
+            length(law.hold.off)
         ));
     }
     let ripple = final_figures.rms;

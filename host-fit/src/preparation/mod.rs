@@ -18,6 +18,7 @@ pub use rest::MovingZero;
 pub use rules::{RULES, Rules};
 
 use crate::baseline::Baselines;
+use crate::data::import::two_levels;
 use crate::data::{Record, Use};
 use crate::model::CommandRange;
 use beginning::Beginning;
@@ -153,6 +154,20 @@ impl Preparation {
                 self.command.off, self.command.full
             ));
         }
+        if levels::two_levels(&self.records).is_none() {
+            let all = self.records.iter().flat_map(|r| r.u.iter().copied());
+            let near = two_levels(&all.collect::<Vec<f64>>());
+            let words = |v: f64| crate::picture::significant(v, 2);
+            remarks.extend(near.map(|(low, high)| {
+                format!(
+                    "u has values near {} and {} and hardly any between: if this is a measured on/off command, \
+                     `import` the files with --u-threshold {}.",
+                    words(low),
+                    words(high),
+                    words(0.5 * (low + high))
+                )
+            }));
+        }
         remarks.extend(self.moving_zero.iter().map(ToString::to_string));
         remarks
     }
@@ -203,4 +218,32 @@ fn follow(records: &mut [Record], beginnings: &[Beginning]) {
 pub fn scored_samples(records: &[Record]) -> (usize, usize) {
     let scored = records.iter().map(|r| r.len().saturating_sub(r.lead)).sum();
     (scored, records.iter().map(Record::len).sum())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_measured_valve_voltage_is_pointed_out() {
+        let remarks = |read: &dyn Fn(f64, usize) -> f64| {
+            let on = |k: usize| f64::from(u8::from(k / 60 % 3 == 1));
+            let u = (0..1200).map(|k| read(on(k), k)).collect();
+            let y = (0..1200).map(|k| (0.1 * k as f64).sin()).collect();
+            let record = Record::new("r", Use::Identify, 0.001, u, y);
+            Preparation::of(&[record]).remarks().join(" ")
+        };
+        let volts = |on: f64, k: usize| 24.0 * on + 0.1 * (k as f64).cos();
+        let told = remarks(&volts);
+        assert!(told.contains("--u-threshold 12"), "{told}");
+        // Two exact levels are an on/off command already; three levels are none.
+        let others: [&dyn Fn(f64, usize) -> f64; 3] =
+            [&|on, _| on, &|on, _| 255.0 * on, &|on, k| {
+                if k % 7 == 0 { 0.5 } else { on }
+            }];
+        for read in others {
+            let told = remarks(read);
+            assert!(!told.contains("--u-threshold"), "{told}");
+        }
+    }
 }

@@ -4,13 +4,14 @@ use serde::Serialize;
 
 use super::prepared::prepared;
 use super::{StepError, check_period};
-use crate::data::DataSet;
+use crate::data::{DataSet, Record};
 use crate::design::{
     DesignError, Margin, MaximiseRequest, Optimum, PossibleFlow, Proof, RULES, TrackDesign,
     TrackRequest, Trial, Trials, held, margin, maximise, possible_flows, prove, prove_pulses,
     track,
 };
 use crate::fit::RULES as FIT;
+use crate::indicators::score;
 use crate::model::{Law, Model};
 use crate::parallel;
 use crate::terms::Units;
@@ -45,9 +46,9 @@ pub struct Design {
     /// Size of y; the rules of the design assume 1.
     #[serde(skip)]
     pub(crate) size: f64,
-    /// Sensor noise as a multiple of a typical hot film's noise.
+    /// Sensor noise of the trials as a multiple of that of a typical hot film for a flow with y of order one.
     #[serde(skip)]
-    pub(crate) noise: f64,
+    pub noise: f64,
 }
 
 /// Figures of a design.
@@ -61,6 +62,12 @@ pub enum DesignOutcome {
 }
 
 impl Design {
+    /// Root mean square of the sensor noise in the trials, y.
+    #[must_use]
+    pub fn noise_rms(&self) -> f64 {
+        self.noise * self.size * noise_rms()
+    }
+
     /// This design; its law notes the trials in which attachment was lost.
     #[must_use]
     pub fn which_lost(self, trials: Vec<String>) -> Self {
@@ -206,7 +213,7 @@ impl Optimum {
 ///
 /// # Errors
 /// [`StepError::Design`] with the reason: out of reach, a model that does not settle, not from rest, a sample period that is no
-/// loop's (0.2 to 100 ms).
+/// law's (0.2 ms to 1 h).
 pub fn design(model: &Model, request: &DesignRequest) -> Result<Design, StepError> {
     check_times(model, request)?;
     let units = units_of_order_one(model);
@@ -248,6 +255,27 @@ pub fn design(model: &Model, request: &DesignRequest) -> Result<Design, StepErro
         size: units.y,
         noise,
     })
+}
+
+/// Root mean square of the noise of a typical hot film, for a flow with y of order one.
+fn noise_rms() -> f64 {
+    RULES.white_noise.hypot(RULES.coloured_noise)
+}
+
+/// The sensor noise averaged over 64 samples, y, from the free-run error of `model` on `set`; the ratio of average to
+/// sample is that of a hot film. `None` if a record is an average over repeats: a single reading has more noise.
+///
+/// # Errors
+/// [`StepError`]: other sampling period, a missing channel, a model whose free run diverges.
+pub fn slow_noise(model: &Model, set: &DataSet) -> Result<Option<f64>, StepError> {
+    check_period(model, set)?;
+    let averaged = |r: &Record| r.y_sd.is_some() || r.y_min.is_some() || r.y_max.is_some();
+    if set.records.iter().any(averaged) {
+        return Ok(None);
+    }
+    let (scores, _) = score(model, &prepared(set)?.records)?;
+    let rmse = scores.held_out().map(|all| all.rmse);
+    Ok(rmse.map(|rmse| rmse * RULES.usual_slow_noise / noise_rms()))
 }
 
 /// The plants that `set` does not exclude, in addition to `model`; a law must keep attachment on them.

@@ -54,7 +54,7 @@ pub use constants::{BoardConstants, constants, written};
 pub use delay::{DelayReport, EdgeReport, measure_delays};
 pub use design::{
     Design, DesignOutcome, DesignRequest, NoStress, TargetVerdict, design, law_margin,
-    passing_targets, possible, try_out, units_of_order_one,
+    passing_targets, possible, slow_noise, try_out, units_of_order_one,
 };
 pub use diagnose::{Finding, diagnose};
 pub use discover::{Terms, discover};

@@ -429,8 +429,10 @@ fn held(
     Ok(values)
 }
 
-/// Two values near which a command lies, if it is a noisy or scaled on/off command.
-fn two_levels(u: &[f64]) -> Option<(f64, f64)> {
+/// Two values near which a command lies, if it is a noisy or scaled on/off command: its lowest and its highest value.
+/// `None` if it is 0 and 1 only, or has other values.
+#[must_use]
+pub fn two_levels(u: &[f64]) -> Option<(f64, f64)> {
     let low = u.iter().copied().fold(f64::INFINITY, f64::min);
     let high = u.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let on_off = u.iter().all(|&v| v == 0.0 || v == 1.0);

@@ -117,6 +117,8 @@ fn the_workbench_finds_what_is_missing_and_loses_nothing() {
     page.until(20, "[...document.querySelectorAll('.switches label')].filter(l => /^[13]\\. /.test(l.textContent)).length === 2 && location.hash.includes('beside=3')");
     page.scroll_to("#records-section");
     page.until(20, "document.querySelectorAll('.record canvas').length > 1");
+    // The book shows this picture; a temporary folder is nobody's project.
+    page.act("document.querySelector('#project').textContent = 'project folder half.workbench'");
     page.shoot("workbench-compared.png");
     // The address of the page contains the view.
     let address = page.act("location.href");

@@ -1,7 +1,8 @@
 //! Screenshots of pages, compared with inspected ones as thumbnails of 64 × 64 greys, because fonts differ between
 //! machines.
 //!
-//! `cargo xtask browser --bless` rewrites the thumbnails; inspect the pictures in `target/browser` first.
+//! `cargo xtask browser --bless` rewrites the thumbnails and the pictures of the book; inspect the pictures in
+//! `target/browser` first.
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
@@ -12,6 +13,12 @@ use super::{Tab, picture, root};
 /// Largest mean difference of the greys, of 255: another font makes 1 to 3, a page in wrong colours about 200, a
 /// missing section 15.
 const DIFFERENCE: f64 = 8.0;
+
+/// Pictures that the book shows, with their place.
+const IN_THE_BOOK: [(&str, &str); 2] = [
+    ("report-ladder.png", "docs/start-report.png"),
+    ("workbench-compared.png", "docs/workbench.png"),
+];
 
 /// The browser reduces a picture, so no PNG decoder is needed here. `small` returns 64 × 64 greys row by row.
 const SMALL: &str = "async (address) => { const i = new Image(); i.src = address; await i.decode(); const c = new OffscreenCanvas(i.width, i.height), x = c.getContext('2d'); x.drawImage(i, 0, 0); const d = x.getImageData(0, 0, i.width, i.height).data, n = 64, sum = new Array(n * n).fill(0), count = new Array(n * n).fill(0); for (let r = 0; r < i.height; r++) for (let k = 0; k < i.width; k++) { const cell = Math.floor(r * n / i.height) * n + Math.floor(k * n / i.width), p = 4 * (r * i.width + k); sum[cell] += 0.299 * d[p] + 0.587 * d[p + 1] + 0.114 * d[p + 2]; count[cell] += 1; } return sum.map((s, k) => Math.round(s / count[k])); }";
@@ -34,6 +41,9 @@ impl Tab<'_> {
             let png = STANDARD.decode(text.as_str().expect("base64"));
             std::fs::create_dir_all(known.parent().expect("a folder")).expect("a folder");
             std::fs::write(&known, png.expect("base64")).expect("a file");
+            for (_, page) in IN_THE_BOOK.iter().filter(|(own, _)| *own == name) {
+                std::fs::copy(&path, root().join(page)).expect("a picture of the book");
+            }
         } else {
             let known = std::fs::read(&known).unwrap_or_else(|_| {
                 panic!("{name} has no thumbnail: look at it, then `cargo xtask browser --bless`")

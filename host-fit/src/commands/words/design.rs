@@ -5,7 +5,7 @@ use closed_loop::{Figures, span};
 use host_fit::design::{
     Case, CaseGroup, Certificate, Margin, Optimum, Proof, RULES, TrackDesign, Weighed, judged,
 };
-use host_fit::picture::{fixed, signed, significant};
+use host_fit::picture::{fixed, signed, significant, time};
 use host_fit::steps::{Design, DesignOutcome};
 
 impl Words for Design {
@@ -44,18 +44,18 @@ fn duration(samples: usize, period_s: f64) -> String {
 
 fn track_words(design: &TrackDesign, period_s: f64) -> String {
     let law = &design.law;
-    let ms = |samples: u32| milliseconds(samples.into(), period_s);
+    let length = |samples: u32| time(f64::from(samples) * period_s, 4);
     let mut text = format!(
         "target {}, reachable levels {:.3} to {:.3}; duty {:.3} on the model ({:.3} by the formula for u_eq)\n\
-         shortest times {} ms open, {} ms closed; predicts up to {} ms ahead{}",
+         shortest times {} open, {} closed; predicts up to {} ahead{}",
         design.target,
         design.reachable[0],
         design.reachable[1],
         design.duty,
         design.equivalent_duty,
-        ms(law.hold.on),
-        ms(law.hold.off),
-        ms(law.look_ahead.into()),
+        length(law.hold.on),
+        length(law.hold.off),
+        length(law.look_ahead.into()),
         every(period_s)
     );
     text.push('\n');
@@ -83,28 +83,26 @@ fn certificate_words(certificate: &Certificate) -> String {
 
 /// The loop's period in words; empty for the usual period.
 fn every(period_s: f64) -> String {
-    let period = milliseconds(1.0, period_s);
-    if period == 1.0 {
-        String::new()
-    } else {
-        format!("; a sample every {period} ms")
+    match milliseconds(1.0, period_s) {
+        1.0 => String::new(),
+        _ => format!("; a sample every {}", time(period_s, 4)),
     }
 }
 
 fn optimum_words(optimum: &Optimum, period_s: f64) -> String {
     let law = &optimum.law;
-    let ms = |samples: u32| milliseconds(samples.into(), period_s);
+    let length = |samples: u32| time(f64::from(samples) * period_s, 4);
     let mut text = if law.period == 1 {
         format!("best: steady blowing, mean y {:.3}", optimum.mean)
     } else {
         let pulses: Vec<String> = law
             .pulses
             .iter()
-            .map(|(first, length)| format!("{} ms from {} ms", ms(*length), ms(*first)))
+            .map(|(first, long)| format!("{} from {}", length(*long), length(*first)))
             .collect();
         format!(
-            "best: period {} ms, open {}; mean y {:.3} with {:.1} % of the air ({} under steady blowing){}",
-            ms(law.period),
+            "best: period {}, open {}; mean y {:.3} with {:.1} % of the air ({} under steady blowing){}",
+            length(law.period),
             pulses.join(" and "),
             optimum.mean,
             100.0 * optimum.duty,
@@ -138,19 +136,19 @@ fn optimum_words(optimum: &Optimum, period_s: f64) -> String {
     }
     if let Some(planned) = &optimum.planned {
         text.push_str(&format!(
-            "\nbest non-periodic command over {} s from rest ({}, a decision every {:.0} ms): value {:.3} with {:.1} % of the air (steady blowing: value {:.3}); {}",
+            "\nbest non-periodic command over {} s from rest ({}, a decision every {}): value {:.3} with {:.1} % of the air (steady blowing: value {:.3}); {}",
             planned.horizon_s,
             if planned.exact { "all tried" } else { "beam search" },
-            1000.0 * planned.block_s,
+            time(planned.block_s, 3),
             planned.value,
             100.0 * planned.duty,
             planned.steady_value,
             match planned.cycle_s {
                 None => "a receding-horizon law stops switching, or the model diverges under it".to_owned(),
                 Some(cycle_s) => format!(
-                    "a receding-horizon law ends in a limit cycle of {:.0} ms ({:.0} % of it irregular), \
+                    "a receding-horizon law ends in a limit cycle of {} ({:.0} % of it irregular), \
                     and this cycle was evaluated like the other pulse trains",
-                    1000.0 * cycle_s,
+                    time(cycle_s, 3),
                     100.0 * planned.irregular
                 ),
             }
@@ -273,7 +271,7 @@ pub(crate) fn trial_rows(proof: &Proof) -> Vec<Vec<String>> {
         cells.extend([f.mean, f.rms].map(|v| fixed(v, 3, false)));
         cells.push(signed(f.offset, 3));
         cells.push(format!("{:.3}", f.peak_to_peak));
-        cells.push(format!("{:.1}", f.switches_per_s));
+        cells.push(significant(f.switches_per_s, 2));
         cells.push(format!("{:.3}", f.air));
         let settling = f.settling_s.map(|s| format!("{s:.2} s"));
         cells.push(settling.unwrap_or_else(|| "never".to_owned()));

@@ -414,6 +414,42 @@ impl Controlled for NoStress {
 mod tests {
     use super::*;
 
+    /// The error of the model is the noise of single readings, unless the records are averages.
+    #[test]
+    fn the_noise_of_a_law_is_that_of_the_records() {
+        let model = Model {
+            a: vec![0.97],
+            b: vec![0.024],
+            ..Model::default()
+        };
+        let u: Vec<f64> = (0..2000)
+            .map(|k| f64::from(u8::from(k / 90 % 2 == 1)))
+            .collect();
+        let mut y = vec![0.0];
+        for u in &u {
+            y.push(0.97 * y[y.len() - 1] + 0.024 * u);
+        }
+        let read = |k: usize, y: f64| y + if k % 2 == 0 { 0.02 } else { -0.02 };
+        let y: Vec<f64> = y
+            .iter()
+            .take(2000)
+            .enumerate()
+            .map(|(k, y)| read(k, *y))
+            .collect();
+        let record = Record::new("r", crate::data::Use::Identify, 0.001, u, y);
+        let set = |record| DataSet::from_records(None, vec![record]).expect("records");
+        let noise = slow_noise(&model, &set(record.clone()))
+            .expect("stable")
+            .expect("single readings");
+        let expected = 0.02 * RULES.usual_slow_noise / noise_rms();
+        assert!((noise / expected - 1.0).abs() < 0.05, "{noise} {expected}");
+        let averaged = Record {
+            y_sd: Some(vec![0.02; 2000]),
+            ..record
+        };
+        assert_eq!(slow_noise(&model, &set(averaged)).expect("stable"), None);
+    }
+
     #[test]
     fn a_finished_model_leads_to_a_law_or_to_an_export() {
         let flow = Model {
@@ -427,7 +463,7 @@ mod tests {
             "host-fit design model.toml DATASET --target 0.4 -o controlled.toml"
         );
         let slow = Model {
-            sample_period_s: 1.0,
+            sample_period_s: 7200.0,
             ..flow
         };
         assert!(command_after(&slow).starts_with("host-fit codegen model.toml --lang python"));

@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::memory::Work;
 use super::prepared::prepared;
 use super::{StepError, check_period};
 use crate::data::DataSet;
@@ -256,6 +257,7 @@ pub fn design(model: &Model, request: &DesignRequest) -> Result<Design, StepErro
 /// [`StepError`]: other sampling period, a missing channel, a model whose free run diverges.
 pub fn possible(model: &Model, set: &DataSet) -> Result<Vec<PossibleFlow>, StepError> {
     check_period(model, set)?;
+    Work::Design.fits(set)?;
     Ok(possible_flows(model, &prepared(set)?)?)
 }
 

@@ -117,6 +117,8 @@ pub struct Controller<L> {
     open: bool,
     /// Valve position requested by a command.
     demand: bool,
+    /// Samples for which a law must still leave the valve closed.
+    rest: u32,
 }
 
 impl<L: Law> Controller<L> {
@@ -136,10 +138,12 @@ impl<L: Law> Controller<L> {
             last: 0.0,
             open: false,
             demand: false,
+            rest: 0,
         }
     }
 
-    /// Arms the law, or ends its pause; a latched fault must be disarmed first.
+    /// Arms the law, or ends its pause; a latched fault must be disarmed first. The law waits until the valve has been
+    /// closed for its shortest time.
     pub fn arm(&mut self) {
         if matches!(self.mode, Mode::Disarmed | Mode::Paused) {
             if self.mode == Mode::Disarmed {
@@ -155,7 +159,7 @@ impl<L: Law> Controller<L> {
     pub fn pause(&mut self) -> bool {
         let runs = self.is_running();
         if runs {
-            self.open = false;
+            self.shut();
             self.mode = Mode::Paused;
         }
         runs
@@ -207,7 +211,7 @@ impl<L: Law> Controller<L> {
     /// Closes the valve and acknowledges a latched fault. A failed self-test is not cleared: damaged
     /// constants must not drive a valve.
     pub fn disarm(&mut self) {
-        self.open = false;
+        self.shut();
         if matches!(self.mode, Mode::Disarmed | Mode::Faulted(Fault::SelfTest)) {
             return;
         }
@@ -220,11 +224,19 @@ impl<L: Law> Controller<L> {
 
     /// Closes the valve and latches `fault`; the first fault is kept.
     pub fn latch(&mut self, fault: Fault) {
-        self.open = false;
+        self.shut();
         if !matches!(self.mode, Mode::Faulted(_)) {
             self.mode = Mode::Faulted(fault);
             #[cfg(feature = "defmt")]
             defmt::error!("fault latched: {} at sample {}", fault, self.samples);
+        }
+    }
+
+    /// Closes the valve for at least its shortest time.
+    fn shut(&mut self) {
+        self.open = false;
+        if matches!(self.mode, Mode::Armed | Mode::Playing) {
+            self.rest = self.settings.hold.of(false);
         }
     }
 
@@ -298,9 +310,10 @@ impl<L: Law> Controller<L> {
         // While a command is played, the residual does not close the valve, because a command may explore
         // behaviour unknown to the model.
         let action = match self.mode {
-            Mode::Armed => self.law.act(y, &channels),
+            Mode::Armed if self.rest == 0 => self.law.act(y, &channels),
             Mode::Playing => self.law.follow(self.demand, y, &channels),
-            Mode::Disarmed | Mode::Paused | Mode::Faulted(_) => {
+            Mode::Armed | Mode::Disarmed | Mode::Paused | Mode::Faulted(_) => {
+                self.rest = self.rest.saturating_sub(1);
                 self.law.follow(false, y, &channels)
             }
         };
@@ -331,6 +344,7 @@ impl<L: Law> Controller<L> {
 mod tests {
     use super::*;
     use crate::law::{Driven, driven};
+    use crate::on_board::{self, OnBoard};
     use crate::relay::Relay;
     use identified::{full, own};
     use model_core::average::MovingAverage;
@@ -429,6 +443,41 @@ mod tests {
             controller.disarm();
             controller.arm();
             assert_eq!(controller.mode(), Mode::Armed);
+        }
+    }
+
+    /// A law that is armed again at once does not open the valve before its shortest time is over, whatever closed it.
+    #[test]
+    fn the_valve_rests_before_a_law_opens_it_again() {
+        type Stop = fn(&mut Controller<OnBoard>);
+        let stops: [Stop; 4] = [
+            |controller| controller.disarm(),
+            |controller| assert!(controller.pause()),
+            |controller| {
+                controller.latch(Fault::Residual);
+                controller.disarm();
+            },
+            |controller| {
+                controller.disarm();
+                assert!(controller.play());
+                controller.demand(true);
+                controller.tick(reading(800.5));
+                controller.disarm();
+            },
+        ];
+        for stop in stops {
+            let mut controller = on_board::controller();
+            controller.arm();
+            while !controller.tick(reading(800.0)).open {}
+            stop(&mut controller);
+            controller.arm();
+            let rest = controller.settings().hold.off;
+            assert_eq!(rest, 4);
+            let mut closed = 0;
+            while !controller.tick(reading(800.0)).open {
+                closed += 1;
+            }
+            assert!(closed >= rest, "{closed}");
         }
     }
 

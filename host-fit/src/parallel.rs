@@ -7,6 +7,11 @@ use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
+/// Number of threads that share the work.
+pub(crate) fn threads() -> usize {
+    rayon::current_num_threads()
+}
+
 /// A collection whose items can be given to different threads.
 pub(crate) trait Items {
     type Item;

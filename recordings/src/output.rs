@@ -4,6 +4,8 @@ use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::{Component, Path, PathBuf};
 
+use crate::set::MANIFEST;
+
 /// Why an output could not be written.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -85,7 +87,11 @@ pub fn check_writable(path: &Path) -> Result<(), OutputError> {
         let device = File::options().write(true).open(&target);
         return device.map(drop).map_err(failed(path));
     }
-    temporary(&target).map(drop).map_err(failed(path))
+    // Without a name, where the system supports that: nothing is left if the program is killed here.
+    let unnamed = tempfile::tempfile_in(parent_of(&target));
+    unnamed
+        .map(drop)
+        .map_err(|cause| failed(path)(without_temporary_name(cause)))
 }
 
 fn failed(path: &Path) -> impl Fn(io::Error) -> OutputError + Copy {
@@ -192,8 +198,8 @@ impl Staging {
     /// Moves everything into the target folder; files of the same names are replaced, others stay.
     ///
     /// A new target appears complete in one rename. An existing target is exchanged in one rename, if the system
-    /// supports that and the target contains only files. Otherwise the file that was written last (`dataset.toml`,
-    /// which lists the others) is removed first and moved in last. Old and new files are thus never mixed in a
+    /// supports that and everything else in the target can be linked. Otherwise the files are moved one by one. If the
+    /// last one is `dataset.toml`, which lists the others, it is removed first: old and new files are never mixed in a
     /// loadable set.
     ///
     /// # Errors
@@ -216,7 +222,9 @@ impl Staging {
         if swap::with(self.folder.path(), &self.target).is_ok() {
             return Ok(());
         }
-        if let (Some(last), 2..) = (destinations.last(), destinations.len()) {
+        if let (Some(last), 2..) = (destinations.last(), destinations.len())
+            && last.ends_with(MANIFEST)
+        {
             match fs::remove_file(last) {
                 Err(e) if e.kind() != io::ErrorKind::NotFound => return Err(failed(last, e)),
                 _ => {}
@@ -237,35 +245,63 @@ mod swap {
     use std::io;
     use std::path::Path;
 
-    /// Exchanges the folders `new` and `old`, and keeps the files of `old` that `new` did not have.
-    /// Afterwards `new` contains the replaced files.
+    /// Largest number of other files and folders in a target that is exchanged.
+    const MOST: usize = 10_000;
+
+    /// Exchanges the folders `new` and `old`, and keeps the files of `old` that `new` did not have, also those in
+    /// folders. Afterwards `new` contains the replaced files.
     pub(super) fn with(new: &Path, old: &Path) -> io::Result<()> {
-        let unfit = || io::Error::from(io::ErrorKind::Unsupported);
         // A process inside the folder would remain in the removed one.
         let here = std::env::current_dir()?;
         if here.starts_with(old) {
             return Err(unfit());
         }
-        let others: Vec<_> = fs::read_dir(old)?.collect::<Result<_, _>>()?;
-        for entry in &others {
+        let mut left = MOST;
+        link_others(old, new, &mut left)?;
+        exchange(new, old)?;
+        keep_added(new, old);
+        Ok(())
+    }
+
+    fn unfit() -> io::Error {
+        io::Error::from(io::ErrorKind::Unsupported)
+    }
+
+    /// Links everything in `old` that `new` does not have into `new`; `left` counts down.
+    fn link_others(old: &Path, new: &Path, left: &mut usize) -> io::Result<()> {
+        let permissions = fs::metadata(old)?.permissions();
+        // The files of such a folder could not be removed afterwards.
+        if permissions.readonly() {
+            return Err(unfit());
+        }
+        for entry in fs::read_dir(old)? {
+            let entry = entry?;
+            *left = left.checked_sub(1).ok_or_else(unfit)?;
             let kept = new.join(entry.file_name());
-            if !entry.file_type()?.is_file() {
-                return Err(unfit());
-            }
-            if !kept.exists() {
+            let exists = kept.symlink_metadata().is_ok();
+            if entry.file_type()?.is_dir() {
+                if !exists {
+                    fs::create_dir(&kept)?;
+                }
+                link_others(&entry.path(), &kept, left)?;
+            } else if !exists {
+                // A symbolic link is linked, not the file to which it leads.
                 fs::hard_link(entry.path(), kept)?;
             }
         }
-        fs::set_permissions(new, fs::metadata(old)?.permissions())?;
-        exchange(new, old)?;
-        // Files that another program added meanwhile are kept.
-        for entry in fs::read_dir(new)?.flatten() {
-            let place = old.join(entry.file_name());
-            if !place.exists() {
+        fs::set_permissions(new, permissions)
+    }
+
+    /// Moves files that another program added meanwhile from the replaced folder into the new one.
+    fn keep_added(replaced: &Path, place: &Path) {
+        for entry in fs::read_dir(replaced).into_iter().flatten().flatten() {
+            let place = place.join(entry.file_name());
+            if place.symlink_metadata().is_err() {
                 let _ = fs::rename(entry.path(), place);
+            } else if entry.file_type().is_ok_and(|kind| kind.is_dir()) {
+                keep_added(&entry.path(), &place);
             }
         }
-        Ok(())
     }
 
     #[cfg(any(target_os = "linux", target_vendor = "apple"))]
@@ -465,10 +501,56 @@ mod tests {
         );
         assert_eq!(fs::read(target.join("notes.txt")).unwrap(), b"mine");
         assert_eq!(entries(folder.path()), ["set"]);
-        // If the target contains a folder, files are moved one by one, in the order in which they were written.
-        fs::create_dir(target.join("more")).unwrap();
-        write("end");
-        assert_eq!(fs::read(target.join("a.csv")).unwrap(), b"end");
-        assert_eq!(entries(&target).len(), 5);
+    }
+
+    /// What else is in the target stays the same, whether the system can exchange the folders or not.
+    #[cfg(unix)]
+    #[test]
+    fn folders_and_links_in_the_target_are_kept() {
+        use std::os::unix::fs::{MetadataExt, PermissionsExt, symlink};
+        let folder = tempfile::tempdir().unwrap();
+        let target = folder.path().join("set");
+        let write = |content: &str| {
+            let mut staging = Staging::new(&target).unwrap();
+            for name in ["a.csv", "sub/b.csv", "dataset.toml"] {
+                staging
+                    .write(name, |w| w.write_all(content.as_bytes()))
+                    .unwrap();
+            }
+            staging.commit().unwrap();
+            fs::metadata(&target).unwrap().ino()
+        };
+        let first = write("0");
+        fs::create_dir_all(target.join("more/yet")).unwrap();
+        fs::write(target.join("more/yet/notes.txt"), "mine").unwrap();
+        fs::write(target.join("sub/notes.txt"), "mine").unwrap();
+        symlink("more", target.join("link")).unwrap();
+        symlink("nowhere", target.join("more/broken")).unwrap();
+        let check = |content: &str| {
+            for name in ["a.csv", "sub/b.csv", "dataset.toml"] {
+                assert_eq!(fs::read(target.join(name)).unwrap(), content.as_bytes());
+            }
+            for name in ["more/yet/notes.txt", "link/yet/notes.txt", "sub/notes.txt"] {
+                assert_eq!(fs::read(target.join(name)).unwrap(), b"mine", "{name}");
+            }
+            let link = |name: &str| fs::read_link(target.join(name)).unwrap();
+            assert_eq!(link("more/broken"), Path::new("nowhere"));
+            assert_eq!(link("link"), Path::new("more"));
+            assert_eq!(entries(folder.path()), ["set"]);
+            assert_eq!(entries(&target).len(), 5);
+        };
+        let second = write("1");
+        check("1");
+        assert_eq!(
+            first == second,
+            cfg!(not(any(target_os = "linux", target_vendor = "apple")))
+        );
+        // A folder that cannot be written prevents the exchange: the files are moved one by one.
+        let mode =
+            |bits| fs::set_permissions(target.join("more"), fs::Permissions::from_mode(bits));
+        mode(0o555).unwrap();
+        assert_eq!(write("2"), second);
+        check("2");
+        mode(0o755).unwrap();
     }
 }

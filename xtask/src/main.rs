@@ -18,6 +18,7 @@ mod fmu;
 mod fuzz;
 mod identified;
 mod invariances;
+mod kills;
 mod msrv;
 mod new_effect;
 mod nucleo;
@@ -25,6 +26,7 @@ mod package;
 mod pages;
 mod periods;
 mod pil;
+mod random;
 mod release;
 mod rig_day;
 mod setup;
@@ -64,6 +66,7 @@ const TASKS: &[Task] = &[
     campaigns::KEPT,
     identified::TASK,
     invariances::TASK,
+    kills::TASK,
     msrv::TASK,
     new_effect::TASK,
     nucleo::TASK,

@@ -11,7 +11,7 @@ use std::process::Command;
 
 pub(crate) const TASK: Task = Task {
     name: "setup",
-    does: "installs the cross targets, QEMU, the C peer's compiler, node, chromium, GCC, NumPy, venv and Octave",
+    does: "installs the cross targets, QEMU, the C peer's compiler, node, chromium, GCC, NumPy, venv, Octave and strace",
     run: setup,
 };
 
@@ -46,6 +46,7 @@ pub(crate) fn setup(_arguments: &[String]) -> Result<()> {
         ("chromium", "chromium"),
         ("gcc", "gcc"),
         ("octave-cli", "octave"),
+        ("strace", "strace"),
     ]
     .into_iter()
     .filter(|(program, _)| !exists(program))

@@ -3,6 +3,7 @@
 use serde::{Serialize, Serializer};
 
 use super::design::command_after;
+use super::memory::Work;
 use super::prepared::prepared;
 use super::{Answer, Beside, StepError, check_period, level};
 use crate::data::DataSet;
@@ -70,6 +71,9 @@ pub fn compare_several(
             error,
         )
     };
+    Work::Compare
+        .fits(set)
+        .map_err(|error| of_first(error.into()))?;
     let ready = prepared(set).map_err(of_first)?;
     let each = given.iter().map(|(name, model)| {
         let comparison = check_period(model, set).and_then(|()| compared_on(model, &ready));
@@ -125,6 +129,7 @@ fn places<S: Serializer>(failures: &Failures, serializer: S) -> Result<S::Ok, S:
 /// [`StepError`] when the sampling periods differ, a channel is missing or a run diverges.
 pub fn compare(model: &Model, set: &DataSet) -> Result<Comparison, StepError> {
     check_period(model, set)?;
+    Work::Compare.fits(set)?;
     compared_on(model, &prepared(set)?)
 }
 

@@ -5,6 +5,7 @@ use std::io;
 use serde::{Serialize, Serializer};
 
 use super::StepError;
+use super::memory::Work;
 use crate::data::{DataSet, Use};
 use crate::delay::{DeadTime, DelayOptions, DelayStudy, EdgeDelay, study_delays};
 use crate::excitation::Excitation;
@@ -179,6 +180,7 @@ impl Serialize for DelayReport {
 /// # Errors
 /// [`StepError::Data`] when an on/off command has values that are neither 0 nor 1.
 pub fn measure_delays(set: &DataSet, options: &DelayOptions) -> Result<DelayReport, StepError> {
+    Work::Delay.fits(set)?;
     let study = study_delays(set, options)?;
     Ok(DelayReport {
         sample_period_s: set.sample_period_s,

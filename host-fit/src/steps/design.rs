@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::memory::Work;
 use super::prepared::prepared;
 use super::{StepError, check_period};
 use crate::data::{DataSet, Record};
@@ -284,6 +285,7 @@ pub fn slow_noise(model: &Model, set: &DataSet) -> Result<Option<f64>, StepError
 /// [`StepError`]: other sampling period, a missing channel, a model whose free run diverges.
 pub fn possible(model: &Model, set: &DataSet) -> Result<Vec<PossibleFlow>, StepError> {
     check_period(model, set)?;
+    Work::Design.fits(set)?;
     Ok(possible_flows(model, &prepared(set)?)?)
 }
 

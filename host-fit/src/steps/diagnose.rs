@@ -3,6 +3,7 @@
 use serde::{Serialize, Serializer};
 use std::collections::BTreeMap;
 
+use super::memory::Work;
 use super::onlooker::watched;
 use super::prepared::prepared;
 use super::{Answer, Onlooker, StepError, check_period, symptom, trained_in_free_run, verdict};
@@ -149,6 +150,7 @@ pub fn diagnose(
     onlooker: &dyn Onlooker,
 ) -> Result<Finding, StepError> {
     check_period(model, set)?;
+    Work::Diagnose.fits(set)?;
     let prepared = prepared(set)?;
     let records = model.targets(&prepared.records);
     let (mut judged_rmse, mut channel) = (None, None);

@@ -1,5 +1,6 @@
 //! Discovery of a term outside the catalogue.
 
+use super::memory::Work;
 use super::onlooker::watched;
 use super::prepared::prepared;
 use super::verdict::{p_bound, times};
@@ -95,6 +96,7 @@ pub fn discover(
     onlooker: &dyn Onlooker,
 ) -> Result<Terms, StepError> {
     check_period(model, set)?;
+    Work::Discover.fits(set)?;
     let prepared = prepared(set)?;
     let records = model.targets(&prepared.records);
     let mut discovery = watched(onlooker, "discovery", || {

@@ -1,6 +1,7 @@
 //! Errors of the steps.
 
 use crate::codegen::CodegenError;
+use crate::data::memory::TooMuch;
 use crate::data::{AverageError, DataError, FilePlace};
 use crate::design::DesignError;
 use crate::diagnose::DiagnoseError;
@@ -25,6 +26,9 @@ pub enum StepError {
     /// The recordings are valid, but their excitation is insufficient.
     #[error(transparent)]
     Excitation(#[from] ExcitationError),
+    /// The records need more memory than allowed.
+    #[error(transparent)]
+    Memory(#[from] TooMuch),
     /// An error in the model file.
     #[error(transparent)]
     Model(#[from] ModelError),

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use serde::{Serialize, Serializer};
 
 use super::design::command_after;
+use super::memory::Work;
 use super::onlooker::watched;
 use super::prepared::prepared;
 use super::{Answer, Onlooker, StepError, check_period, level, trained_in_free_run};
@@ -125,6 +126,7 @@ pub fn extend(
     onlooker: &dyn Onlooker,
 ) -> Result<Extension, StepError> {
     check_period(model, set)?;
+    Work::Diagnose.fits(set)?;
     let prepared = prepared(set)?;
     let records = model.targets(&prepared.records);
     // A model that diverges on these records can still be extended.

@@ -3,6 +3,7 @@
 use serde::{Serialize, Serializer};
 
 use super::candidate_law::candidate_law;
+use super::memory::Work;
 use super::onlooker::{Searching, watched};
 use super::prepared::prepared;
 use super::{
@@ -345,6 +346,7 @@ pub fn identify(
     request: &IdentifyRequest,
     onlooker: &dyn Onlooker,
 ) -> Result<Identification, StepError> {
+    Work::Identify.fits(set)?;
     let prepared = prepared(set)?;
     let structure = request.structure(set, &prepared)?;
     let demand = Demand {

@@ -38,6 +38,7 @@ mod extend;
 mod identify;
 mod import;
 mod level;
+mod memory;
 mod onlooker;
 mod prepared;
 mod rules;

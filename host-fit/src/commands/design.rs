@@ -268,6 +268,11 @@ impl Args {
             }
         }
         let design = steps::design(model, &request)?;
+        // The level of rest of the law's model is 0.
+        let model = &Model {
+            law: None,
+            ..design.model.clone()
+        };
         let mut notes = Vec::new();
         let possible = match set {
             Some(set) => steps::possible(model, set)?,

@@ -1,6 +1,6 @@
 //! Requirements of a law on its model, and why no law was designed.
 
-use crate::model::{Model, Start};
+use crate::model::Model;
 use crate::picture::time;
 use crate::terms::Units;
 use model_core::control::Unusable;
@@ -24,11 +24,6 @@ pub enum DesignError {
     /// The law's constants do not fit the model.
     #[error(transparent)]
     Unusable(#[from] Unusable),
-    /// The model starts in mid-run.
-    #[error(
-        "the free run of the model starts from measurements, not from rest; identify it on records that start at rest"
-    )]
-    NotFromRest,
     /// The model's sample period is outside the range of a law.
     #[error(
         "key `sample_period_s`: a law runs with a sample period of 0.2 ms to 1 h, and the model has {}; \
@@ -125,15 +120,6 @@ pub fn check_period(model: &Model) -> Result<(), DesignError> {
         true => Ok(()),
         false => Err(DesignError::SamplePeriod(model.sample_period_s)),
     }
-}
-
-/// Rejects models from which no law can be designed.
-pub(super) fn check(model: &Model) -> Result<(), DesignError> {
-    check_period(model)?;
-    if model.start == Start::Measured {
-        return Err(DesignError::NotFromRest);
-    }
-    Ok(())
 }
 
 #[cfg(test)]

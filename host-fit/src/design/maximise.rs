@@ -6,7 +6,7 @@
 //! can propose further ones.
 
 use super::bench::{Player, hold_times};
-use super::error::{DesignError, check};
+use super::error::{DesignError, check_period};
 use super::horizon::{self, FlowState, Horizon};
 use super::rules::RULES;
 use super::train::{JudgedTrain, Played, Train, distinct};
@@ -206,9 +206,9 @@ impl Outside {
 ///
 /// # Errors
 /// [`DesignError::OnlyInstabilities`] when not even steady blowing survives the
-/// long run; [`DesignError::NotFromRest`], [`DesignError::SamplePeriod`].
+/// long run; [`DesignError::SamplePeriod`].
 pub fn maximise(model: &Model, request: &MaximiseRequest) -> Result<Optimum, DesignError> {
-    check(model)?;
+    check_period(model)?;
     let period_s = model.sample_period_s;
     let bench = Player::of(model);
     let longest = match request.longest_period_s {

@@ -10,6 +10,8 @@ use rand_distr::{Distribution, StandardNormal};
 #[derive(Clone)]
 pub(super) struct Noisy<F> {
     flow: F,
+    /// Part of the sensor's offset that counts as friction, y.
+    zero: f64,
     /// Standard deviations of the white and the coloured part, y.
     sizes: [f64; 2],
     /// Pole of the coloured part.
@@ -23,11 +25,18 @@ impl<F> Noisy<F> {
     pub(super) fn new(flow: F, size: f64, seed: u64) -> Self {
         Self {
             flow,
+            zero: 0.0,
             sizes: [RULES.white_noise, RULES.coloured_noise].map(|noise| size * noise),
             kept: (-1.0 / RULES.noise_memory).exp(),
             coloured: 0.0,
             rng: ChaCha8Rng::seed_from_u64(seed),
         }
+    }
+
+    /// The flow on a rig whose sensor has an offset that is larger by `zero` than the law assumes. Without a reading at
+    /// rest it cannot be told from friction, so it counts as friction.
+    pub(super) fn with_zero(self, zero: f64) -> Self {
+        Self { zero, ..self }
     }
 
     fn normal(&mut self) -> f64 {
@@ -48,7 +57,7 @@ impl<F: Controlled> Controlled for Noisy<F> {
         Some(reading? + noise)
     }
     fn friction(&self) -> f64 {
-        self.flow.friction()
+        self.flow.friction() + self.zero
     }
 }
 
@@ -83,5 +92,12 @@ mod tests {
         assert!((lagged(0) / all - 1.0).abs() < 0.05, "{}", lagged(0));
         let later = coloured * (-10.0 / RULES.noise_memory).exp();
         assert!((lagged(10) / later - 1.0).abs() < 0.1, "{}", lagged(10));
+    }
+
+    #[test]
+    fn an_unknown_offset_counts_as_friction() {
+        let flow = Noisy::new(Still, 1.0, 3);
+        let (plain, moved) = (flow.friction(), flow.clone().with_zero(-0.2).friction());
+        assert!((moved - plain + 0.2).abs() < 1e-12);
     }
 }

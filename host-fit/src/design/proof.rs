@@ -274,15 +274,17 @@ fn on_bench<'a>(
     }
 }
 
-/// Trial on a possible plant.
-fn on_possible(law: &impl Ready, flow: &PossibleFlow, noise: f64, seed: u64) -> Case {
+/// Trial on a possible plant of a law for a sensor with offset `zero`.
+fn on_possible(law: &impl Ready, flow: &PossibleFlow, zero: f64, noise: f64, seed: u64) -> Case {
+    let own = flow.model.zero_among(&flow.model.values());
     let bench = Player::<f64>::of(&flow.model);
     let group = if flow.is_possible() {
         CaseGroup::Possible
     } else {
         CaseGroup::Unseen
     };
-    let trial = on_bench(&bench, group, &flow.name, noise, seed);
+    let mut trial = on_bench(&bench, group, &flow.name, noise, seed);
+    trial.flow = trial.flow.with_zero(own - zero);
     let (case, _) = law.run(&trial);
     Case {
         p_value: Some(flow.p_value),
@@ -305,8 +307,9 @@ where
     );
     let (on_model, trace) = law.run(&noisy);
     let mut cases = vec![on_model];
+    let zero = model.zero_among(&model.values());
     cases.extend(parallel::each(trials.possible, |flow| {
-        on_possible(law, flow, trials.noise, trials.seed)
+        on_possible(law, flow, zero, trials.noise, trials.seed)
     }));
     cases.extend(parallel::each(trials.stress, |trial| law.run(trial).0));
     (cases, trace)

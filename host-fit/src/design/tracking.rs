@@ -2,7 +2,7 @@
 
 use super::bench::{Player, hold_times};
 use super::certificate::{Certificate, certificate};
-use super::error::{DesignError, check};
+use super::error::{DesignError, check_period};
 use super::rules::RULES;
 use super::steady::{Steady, steady, time_constants};
 use crate::model::{Delay, Model, Track};
@@ -92,7 +92,7 @@ pub(crate) struct Held {
 
 /// The levels that on/off blowing can hold on `model`; [`DesignError`] if no law can be designed for any level.
 pub(crate) fn held(model: &Model) -> Result<Held, DesignError> {
-    check(model)?;
+    check_period(model)?;
     if model.averaging.averaged_model {
         return Err(Unusable::AveragedModel.into());
     }

@@ -15,7 +15,7 @@ use crate::fit::RULES as FIT;
 use crate::indicators::score;
 use crate::model::{Law, Model};
 use crate::parallel;
-use crate::terms::Units;
+use crate::terms::{Units, resting_at_zero};
 use closed_loop::Controlled;
 
 /// Goal of a law. Levels are sensor readings, offset included, in the unit of the records; costs and rates
@@ -213,10 +213,11 @@ impl Optimum {
 /// ```
 ///
 /// # Errors
-/// [`StepError::Design`] with the reason: out of reach, a model that does not settle, not from rest, a sample period that is no
+/// [`StepError::Design`] with the reason: out of reach, a model that does not settle, a sample period that is no
 /// law's (0.2 ms to 1 h).
 pub fn design(model: &Model, request: &DesignRequest) -> Result<Design, StepError> {
     check_times(model, request)?;
+    let model = &resting_at_zero(model);
     let units = units_of_order_one(model);
     let inner = units.model_in(model);
     let outward = |error: DesignError| error.outward(&units);

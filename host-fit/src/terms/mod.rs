@@ -60,3 +60,4 @@ pub use table::{Candidate, Table};
 pub use term::Term;
 pub(crate) use term::second_lag_s;
 pub use units::Units;
+pub(crate) use units::resting_at_zero;

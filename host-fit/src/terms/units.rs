@@ -222,6 +222,25 @@ impl Units {
     }
 }
 
+/// `model` with 0 as its level at rest and a sensor offset in its place, which changes no reading. A model that starts in
+/// mid-run has the offset in its constant, and a loop that starts with a history of 0 would begin far from rest. Models
+/// with effects, or with a delay that depends on y, are not changed: their levels have a meaning.
+#[must_use]
+pub(crate) fn resting_at_zero(model: &Model) -> Model {
+    let mut resting = model.clone();
+    let kept = 1.0 - model.a.iter().sum::<f64>();
+    let movable = model.start == Start::Measured
+        && model.effects.is_empty()
+        && !model.delay.follows_y()
+        && kept > 0.0;
+    let level = model.constant / kept;
+    if movable && level.is_finite() && level != 0.0 {
+        Units::NONE.move_zero(&mut resting, -level);
+        resting.add(ZERO_OFFSET, &[level], None);
+    }
+    resting
+}
+
 /// Whether a model has effects on the jet.
 fn has_jet_effects(model: &Model) -> bool {
     let place = |name: &str| model.spec(name).map(|spec| spec.place);
@@ -248,6 +267,38 @@ mod tests {
             })
             .collect();
         Record::new("r", Use::Identify, c * 0.001, u, y)
+    }
+
+    /// A model of records in mid-run rests at 21 degrees; moved, it rests at 0 with this offset and reads the same.
+    #[test]
+    fn a_model_in_mid_run_rests_at_zero_without_other_readings() {
+        let mut warm = Model {
+            start: Start::Measured,
+            constant: 21.0 * 0.03,
+            a: vec![0.97],
+            b: vec![1.2],
+            product_lags: vec![1],
+            c: vec![-0.004],
+            ..Model::default()
+        };
+        let resting = resting_at_zero(&warm);
+        assert!(resting.constant.abs() < 1e-12);
+        let zero = resting.zero_among(&resting.values());
+        assert!((zero - 21.0).abs() < 1e-12, "{zero}");
+        let (mut read, mut moved) = (40.0_f64, 40.0 - zero);
+        for k in 0..500 {
+            let u = f64::from(u8::from(k / 60 % 2 == 1));
+            let step = |m: &Model, y: f64| m.constant + m.a[0] * y + (m.b[0] + m.c[0] * y) * u;
+            (read, moved) = (step(&warm, read), step(&resting, moved));
+            assert!((read - moved - zero).abs() < 1e-9, "{k}");
+        }
+        // Levels that have a meaning are not moved.
+        warm.add(
+            spec("hot-film-lag").expect("in the catalogue"),
+            &[20.0],
+            None,
+        );
+        assert_eq!(resting_at_zero(&warm), warm);
     }
 
     /// Records in different user units are equal in inner units.

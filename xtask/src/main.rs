@@ -19,6 +19,7 @@ mod fuzz;
 mod identified;
 mod invariances;
 mod kills;
+mod long_run;
 mod msrv;
 mod new_effect;
 mod nucleo;
@@ -67,6 +68,7 @@ const TASKS: &[Task] = &[
     identified::TASK,
     invariances::TASK,
     kills::TASK,
+    long_run::TASK,
     msrv::TASK,
     new_effect::TASK,
     nucleo::TASK,

@@ -20,7 +20,9 @@ mod identified;
 mod invariances;
 mod kills;
 mod long_run;
+mod memory;
 mod msrv;
+mod mutants;
 mod new_effect;
 mod nucleo;
 mod package;
@@ -69,7 +71,9 @@ const TASKS: &[Task] = &[
     invariances::TASK,
     kills::TASK,
     long_run::TASK,
+    memory::TASK,
     msrv::TASK,
+    mutants::TASK,
     new_effect::TASK,
     nucleo::TASK,
     package::TASK,

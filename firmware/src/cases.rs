@@ -175,6 +175,16 @@ mod tests {
     use super::*;
 
     #[test]
+    fn a_model_with_a_channel_reads_it() {
+        assert_eq!(SETTINGS.channel, None);
+        let channel = settings(&[20.0], 0.001).channel.expect("a channel");
+        assert_eq!(
+            (channel.reference, channel.calibration.value(2048.0)),
+            (20.0, 20.0)
+        );
+    }
+
+    #[test]
     fn every_case_switches_and_starts_anew() {
         let mut rigs = Rigs::new();
         for case in 0..CASES.len() as u8 {

@@ -1,5 +1,5 @@
-//! Scenarios across the crates: campaigns with hidden effects, agreement of languages, lockstep runs, and
-//! records from other loggers.
+//! Scenarios across the crates: campaigns with hidden effects, agreement of languages, lockstep and long
+//! runs, and records from other loggers.
 
 pub mod agreement;
 pub mod browser;
@@ -8,6 +8,7 @@ pub mod fuzz;
 pub mod invariances;
 pub mod laws;
 pub mod lockstep;
+pub mod long_run;
 pub mod strangers;
 
 use std::ffi::OsStr;

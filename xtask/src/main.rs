@@ -19,7 +19,10 @@ mod fuzz;
 mod identified;
 mod invariances;
 mod kills;
+mod long_run;
+mod memory;
 mod msrv;
+mod mutants;
 mod new_effect;
 mod nucleo;
 mod package;
@@ -67,7 +70,10 @@ const TASKS: &[Task] = &[
     identified::TASK,
     invariances::TASK,
     kills::TASK,
+    long_run::TASK,
+    memory::TASK,
     msrv::TASK,
+    mutants::TASK,
     new_effect::TASK,
     nucleo::TASK,
     package::TASK,

@@ -376,6 +376,22 @@ mod tests {
         }
     }
 
+    /// The first sample fills the cache of the look-ahead, which costs as much as a prediction; the second decides.
+    #[test]
+    fn the_first_sample_makes_no_decision() {
+        let mut decisions = [true; 2];
+        on_its_model::<f64>(
+            LagConvention::OneStep,
+            law(0.5, 1),
+            2,
+            |k, _, _, decision| {
+                decisions[k] = decision.on;
+                None
+            },
+        );
+        assert_eq!(decisions, [false, true]);
+    }
+
     struct Run {
         rms: f64,
         mean: f64,

@@ -34,7 +34,7 @@ impl<F> Noisy<F> {
     }
 
     /// The flow on a rig whose sensor has an offset that is larger by `zero` than the law assumes. Without a reading at
-    /// rest it cannot be told from friction, so it counts as friction.
+    /// rest it is not distinguishable from friction, so it counts as friction.
     pub(super) fn with_zero(self, zero: f64) -> Self {
         Self { zero, ..self }
     }

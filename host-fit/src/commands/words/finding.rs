@@ -147,6 +147,11 @@ fn percent(value: f64) -> String {
     format!("{sign}{:.1} %", rounded.abs())
 }
 
+/// A whole number with a true minus sign; never "−0".
+fn whole(number: f64) -> String {
+    format!("{:.0}", number + 0.0).replace('-', "−")
+}
+
 /// The outcome of a candidate, with the reason.
 fn outcome(r: &Ranked, diagnosis: &Diagnosis, plant: Plant) -> String {
     let own = outcome_alone(r, diagnosis, plant);
@@ -250,7 +255,7 @@ fn candidate_row(r: &Ranked, diagnosis: &Diagnosis, plant: Plant) -> Vec<String>
         outcome(r, diagnosis, plant),
         percent(r.error_reduction_percent),
         r.gain_nats
-            .map_or_else(|| "–".to_owned(), |nats| format!("{nats:.0}")),
+            .map_or_else(|| "–".to_owned(), |nats| whole(nats.round())),
         if r.refitted {
             p_bound(r.p_value)
         } else {

@@ -432,7 +432,7 @@ mod tests {
         for u in &u {
             y.push(0.97 * y[y.len() - 1] + 0.024 * u);
         }
-        let read = |k: usize, y: f64| y + if k % 2 == 0 { 0.02 } else { -0.02 };
+        let read = |k: usize, y: f64| y + if k.is_multiple_of(2) { 0.02 } else { -0.02 };
         let y: Vec<f64> = y
             .iter()
             .take(2000)

@@ -197,6 +197,21 @@ impl ShortestTime<'_> {
     }
 }
 
+/// The user's command with another target; `None` without a target.
+fn again(line: impl Iterator<Item = String>, target: Option<f64>) -> Option<String> {
+    let target = target?.to_string();
+    let mut words: Vec<String> = line.skip(1).collect();
+    let option = words
+        .iter()
+        .position(|word| word == "--target" || word.starts_with("--target="))?;
+    match words[option].contains('=') {
+        true => words[option] = format!("--target={target}"),
+        false => *words.get_mut(option + 1)? = target,
+    }
+    let words: Vec<String> = words.iter().map(|word| page::quoted(word)).collect();
+    Some(format!("host-fit {}", words.join(" ")))
+}
+
 impl Args {
     fn request(&self, rig: Option<&RigFile>, model: &Model) -> anyhow::Result<DesignRequest> {
         let period_s = model.sample_period_s;
@@ -304,6 +319,11 @@ impl Args {
             }
             _ => Vec::new(),
         };
+        let passing = targets.iter().filter(|target| target.passes);
+        let from = |target: f64| (target - self.target.unwrap_or(f64::NAN)).abs();
+        let nearest = passing
+            .map(|passing| passing.target)
+            .min_by(|a, b| from(*a).total_cmp(&from(*b)));
         // A law that loses attachment on its own model has no margin.
         let margin = proof
             .keeps_its_model()
@@ -316,6 +336,10 @@ impl Args {
             targets,
             not_tried: notes,
             noise_from,
+            again: again(
+                std::env::args_os().map(|word| word.to_string_lossy().into_owned()),
+                nearest,
+            ),
             file: shell_word(&self.output),
             answer: Answer::default(),
         }
@@ -434,6 +458,24 @@ mod tests {
             assert!(valve_time(wrong).is_err(), "{wrong}");
         }
         assert!(some_time("0").is_err() && some_time("0samples").is_err());
+    }
+
+    #[test]
+    fn the_command_is_repeated_with_the_target_that_passes() {
+        let line = |text: &str| {
+            let words = text.split(' ').map(str::to_owned);
+            again(words.collect::<Vec<_>>().into_iter(), Some(42.0))
+        };
+        assert_eq!(
+            line("/bin/host-fit design m.toml set --target 35 --min-on 5 -o c.toml").as_deref(),
+            Some("host-fit design m.toml set --target 42 --min-on 5 -o c.toml")
+        );
+        assert_eq!(
+            line("host-fit design m.toml --target=35 -o c.toml").as_deref(),
+            Some("host-fit design m.toml --target=42 -o c.toml")
+        );
+        assert_eq!(line("host-fit workbench set"), None);
+        assert_eq!(line("host-fit design m.toml --target"), None);
     }
 
     #[test]

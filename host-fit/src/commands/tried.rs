@@ -26,6 +26,9 @@ pub(super) struct Tried {
     pub(super) not_tried: Vec<String>,
     /// Where the sensor noise of the trials comes from.
     pub(super) noise_from: NoiseFrom,
+    /// The user's command with the nearest target that passes.
+    #[serde(skip)]
+    pub(super) again: Option<String>,
     /// The file of the law, quoted for a shell.
     #[serde(skip)]
     pub(super) file: String,
@@ -136,9 +139,12 @@ impl Tried {
                 }
                 // The boards' timers are not made for slow loops.
                 Held::Yes => format!("host-fit codegen {} --lang c -o controlled.c", self.file),
-                // The remark on the shortest times says what to change; no command is known to hold the target.
+                // If no target is known to pass, the remarks say what to change.
                 Held::No | Held::NoSwitch => String::new(),
             });
+        if let Some(again) = &self.again {
+            answer = answer.next(again.clone());
+        }
         if held == Held::NoSwitch {
             for remark in self
                 .remarks()
@@ -157,9 +163,7 @@ impl Tried {
     /// The figures of a tracking law on the model with a noisy sensor, the trial of the picture.
     fn on_the_model(&self) -> Option<&Figures> {
         let tracks = matches!(self.design.outcome, DesignOutcome::Track(_));
-        let model = |case: &&Case| case.group == CaseGroup::Model;
-        let last = self.proof.cases.iter().rfind(model).filter(|_| tracks);
-        last.map(|case| &case.figures)
+        self.proof.on_its_model().filter(|_| tracks)
     }
 
     /// Whether the law holds its target on the model.

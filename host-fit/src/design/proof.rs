@@ -109,6 +109,13 @@ impl Proof {
             .is_empty()
     }
 
+    /// The figures of the law on its model with sensor noise.
+    #[must_use]
+    pub fn on_its_model(&self) -> Option<&Figures> {
+        let model = |case: &&Case| case.group == CaseGroup::Model;
+        self.cases.iter().rfind(model).map(|case| &case.figures)
+    }
+
     /// Names of the other trials in which attachment was lost: undetectable effects and stress.
     #[must_use]
     pub fn lost_beyond_the_records(&self) -> Vec<String> {

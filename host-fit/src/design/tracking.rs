@@ -259,7 +259,8 @@ pub fn track(model: &Model, request: &TrackRequest) -> Result<TrackDesign, Desig
         let length = |samples: u32| time(f64::from(samples) * period_s, 4);
         remarks.push(format!(
             "on the model the valve does not switch after the start: shortest times of {} open and {} closed \
-             are too long for its response; choose another target, or give shorter times (`--min-on`, `--min-off`) if the valve can follow them",
+             are too long for its response; choose another target, or allow shorter times: `--min-on`, `--min-off`; times \
+             shorter than those of the records need records with such pulses, or a measured valve (`--rig rig.toml`)",
             length(law.hold.on),
             length(law.hold.off)
         ));

@@ -21,6 +21,9 @@ pub struct BoardConstants {
     pub effects: Vec<String>,
     /// Law of the model.
     pub law: Option<Law>,
+    /// Sensor offset, which the levels of the law do not include, y.
+    #[serde(skip)]
+    pub sensor_zero: f64,
 }
 
 /// Writes `model`, and its law where it has one, as Rust for a `no_std` crate on `model-core`.
@@ -49,6 +52,7 @@ pub fn constants(model: &Model) -> Result<BoardConstants, StepError> {
 pub fn written(model: &Model, language: &Language) -> Result<BoardConstants, StepError> {
     let text = write(model, language)?;
     Ok(BoardConstants {
+        sensor_zero: model.zero_among(&model.values()),
         sizes: [model.a.len(), model.product_lags.len(), model.b.len()],
         bytes: text.len(),
         effects: model.effect_names(),

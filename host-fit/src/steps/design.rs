@@ -16,7 +16,7 @@ use crate::indicators::score;
 use crate::model::{Law, Model};
 use crate::parallel;
 use crate::terms::{Units, resting_at_zero};
-use closed_loop::Controlled;
+use closed_loop::{Controlled, Figures};
 
 /// Goal of a law. Levels are sensor readings, offset included, in the unit of the records; costs and rates
 /// are in the same unit.
@@ -338,9 +338,9 @@ pub fn law_margin(design: &Design, seed: u64, planes: bool) -> Option<Margin> {
 pub struct TargetVerdict {
     /// The target, in the sensor's units.
     pub target: f64,
-    /// Whether the law passes all trials on plants consistent with the records.
+    /// Whether the law holds the target on the model and passes all trials on plants consistent with the records.
     pub passes: bool,
-    /// Reason of a failure: the trials that lose attachment, or the error of the design.
+    /// Reason of a failure: the trials that lose attachment, a target that is not held, or the error of the design.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reason: Option<String>,
 }
@@ -383,8 +383,14 @@ pub fn passing_targets(
         let request = DesignRequest::Track(TrackRequest { target, ..*request });
         let reason = match design(model, &request) {
             Ok(design) => {
-                let lost = try_out::<NoStress>(&design, possible, &[], seed).lost();
-                (!lost.is_empty()).then(|| lost.join(", "))
+                let proof = try_out::<NoStress>(&design, possible, &[], seed);
+                let lost = proof.lost();
+                let settles = |figures: &Figures| figures.settling_s.is_some();
+                match lost.is_empty() {
+                    false => Some(lost.join(", ")),
+                    true if proof.on_its_model().is_none_or(settles) => None,
+                    true => Some("the law does not hold the target on the model".to_owned()),
+                }
             }
             Err(error) => Some(error.to_string()),
         };

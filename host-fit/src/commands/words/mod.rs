@@ -327,7 +327,8 @@ impl Words for BoardConstants {
             },
             match &self.law {
                 None => "none".to_owned(),
-                Some(Law::Track(law)) => format!("holds {}", significant(law.reference, 4)),
+                Some(Law::Track(law)) =>
+                    format!("holds {}", significant(law.reference + self.sensor_zero, 4)),
                 Some(Law::Maximise(law)) => format!("pulses every {} samples", law.period),
             }
         )

@@ -546,21 +546,31 @@ fn a_law_that_loses_its_own_model_is_refused_with_the_targets_that_pass() {
     // A time constant of 0.2 s and a constant delay.
     std::fs::write(&model, first_order(0.995, 0.005, FIXED_DELAY)).expect("a file");
     // Trials of half the length give the same decision, and three of nine other targets suffice.
-    let line = |more: &str| {
-        quick(&format!(
-            "design {{}} -o {{}} --target 0.5 --min-off 0.6 {more}"
-        ))
+    let line = |more: &str| quick(&format!("design {{}} -o {{}} --target 0.5 {more}"));
+    let refused = |more: &str, parts: &[&str]| {
+        let output = run(&line(more), &[&model, &controlled]);
+        let error = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{error}");
+        contains_all(&error, parts);
+        assert!(!controlled.exists());
+        String::from_utf8_lossy(&output.stdout).into_owned()
     };
-    let output = run(&line("--set design.targets=4"), &[&model, &controlled]);
-    let error = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(1), "{error}");
-    contains_all(
-        &error,
-        &["the model itself", "Targets that pass: 0.", "--force"],
+    let said = refused(
+        "--min-off 0.35 --set design.targets=4",
+        &[
+            "the model, noisy sensor",
+            "Targets that pass: 0.",
+            "--force",
+        ],
     );
-    assert!(!controlled.exists());
+    assert!(said.contains("--target 0.25 --min-off 0.35"), "{said}");
+    // With the shortest pause of three time constants the valve stays open at the other targets.
+    refused(
+        "--min-off 0.6 --set design.targets=4",
+        &["the model itself", "No target in the reachable interval"],
+    );
     let design = json(
-        &line("--set design.targets=1 --force"),
+        &line("--min-off 0.6 --set design.targets=1 --force"),
         &[&model, &controlled],
     );
     let lost = design["law"]["lost"].as_array().expect("trials");

@@ -314,7 +314,9 @@ impl Args {
         let proof = steps::try_out(&design, &possible, &stress, self.seed);
         let lost = proof.lost();
         let targets = match (&request, &design.outcome) {
-            (DesignRequest::Track(request), DesignOutcome::Track(track)) if !lost.is_empty() => {
+            (DesignRequest::Track(request), DesignOutcome::Track(track))
+                if !lost.is_empty() || !proof.holds() =>
+            {
                 steps::passing_targets(model, request, track.reachable, &possible, self.seed)
             }
             _ => Vec::new(),

@@ -83,7 +83,8 @@ impl Tried {
         if self.targets.is_empty() {
             "Record more varied commands, and identify again.".to_owned()
         } else if passing.is_empty() {
-            "No target in the reachable interval passes: record more varied commands, and identify again."
+            "No target in the reachable interval passes: allow shorter times of the valve, or record more varied \
+             commands and identify again."
                 .to_owned()
         } else {
             format!("Targets that pass: {}.", passing.join(", "))

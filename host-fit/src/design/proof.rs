@@ -116,6 +116,13 @@ impl Proof {
         self.cases.iter().rfind(model).map(|case| &case.figures)
     }
 
+    /// Whether a tracking law holds its target on its model with sensor noise.
+    #[must_use]
+    pub fn holds(&self) -> bool {
+        let settles = |figures: &Figures| figures.settling_s.is_some();
+        self.on_its_model().is_none_or(settles)
+    }
+
     /// Names of the other trials in which attachment was lost: undetectable effects and stress.
     #[must_use]
     pub fn lost_beyond_the_records(&self) -> Vec<String> {

@@ -16,7 +16,7 @@ use crate::indicators::score;
 use crate::model::{Law, Model};
 use crate::parallel;
 use crate::terms::{Units, resting_at_zero};
-use closed_loop::{Controlled, Figures};
+use closed_loop::Controlled;
 
 /// Goal of a law. Levels are sensor readings, offset included, in the unit of the records; costs and rates
 /// are in the same unit.
@@ -385,10 +385,9 @@ pub fn passing_targets(
             Ok(design) => {
                 let proof = try_out::<NoStress>(&design, possible, &[], seed);
                 let lost = proof.lost();
-                let settles = |figures: &Figures| figures.settling_s.is_some();
                 match lost.is_empty() {
                     false => Some(lost.join(", ")),
-                    true if proof.on_its_model().is_none_or(settles) => None,
+                    true if proof.holds() => None,
                     true => Some("the law does not hold the target on the model".to_owned()),
                 }
             }

@@ -156,6 +156,7 @@ impl<L: Law> Controller<L> {
     }
 
     /// Closes the valve until the law is armed again. The law keeps its settings. Returns whether a law was running.
+    #[inline(never)]
     pub fn pause(&mut self) -> bool {
         let runs = self.is_running();
         if runs {
@@ -210,6 +211,7 @@ impl<L: Law> Controller<L> {
 
     /// Closes the valve and acknowledges a latched fault. A failed self-test is not cleared: damaged
     /// constants must not drive a valve.
+    #[inline(never)]
     pub fn disarm(&mut self) {
         self.shut();
         if matches!(self.mode, Mode::Disarmed | Mode::Faulted(Fault::SelfTest)) {
@@ -223,6 +225,8 @@ impl<L: Law> Controller<L> {
     }
 
     /// Closes the valve and latches `fault`; the first fault is kept.
+    #[cold]
+    #[inline(never)]
     pub fn latch(&mut self, fault: Fault) {
         self.shut();
         if !matches!(self.mode, Mode::Faulted(_)) {
@@ -233,6 +237,7 @@ impl<L: Law> Controller<L> {
     }
 
     /// Closes the valve for at least its shortest time.
+    #[inline]
     fn shut(&mut self) {
         self.open = false;
         if matches!(self.mode, Mode::Armed | Mode::Playing) {
@@ -311,10 +316,10 @@ impl<L: Law> Controller<L> {
         // behaviour unknown to the model.
         let action = match self.mode {
             Mode::Armed if self.rest == 0 => self.law.act(y, &channels),
-            Mode::Playing => self.law.follow(self.demand, y, &channels),
-            Mode::Armed | Mode::Disarmed | Mode::Paused | Mode::Faulted(_) => {
+            mode => {
                 self.rest = self.rest.saturating_sub(1);
-                self.law.follow(false, y, &channels)
+                let demand = mode == Mode::Playing && self.demand;
+                self.law.follow(demand, y, &channels)
             }
         };
         self.strayed += (action.residual - self.strayed) * Self::SHARE;

@@ -38,8 +38,8 @@ struct Way {
     /// Number of significant effects. Effects that a second copy of another effect replaces, and effects whose
     /// parameters are not identifiable, are not counted.
     proven: usize,
-    /// A step with fewer effects and a clearly smaller error than the model with all effects: that one has not
-    /// converged.
+    /// The step with fewer effects and the least error, if that is clearly smaller than the error of the model with all
+    /// effects, which then has not converged.
     better: Option<Hypothesis>,
 }
 
@@ -317,7 +317,11 @@ impl Session<'_> {
             let Some((spec, lesser)) = self.without_the_least(&current, root) else {
                 break;
             };
-            if lesser.judged.rmse() < (1.0 - RULES.worthwhile) * last.judged.rmse() {
+            let least = better.as_ref().map_or(
+                (1.0 - RULES.worthwhile) * last.judged.rmse(),
+                |better: &Hypothesis| better.judged.rmse(),
+            );
+            if lesser.judged.rmse() < least {
                 better = Some(lesser.clone());
             }
             left.retain(|other| other.name != spec.name);

@@ -225,6 +225,7 @@ impl<L: Law> Controller<L> {
     }
 
     /// Closes the valve and latches `fault`; the first fault is kept.
+    // Out of line, as `pause` and `disarm`: a copy at each of their calls would take flash.
     #[cold]
     #[inline(never)]
     pub fn latch(&mut self, fault: Fault) {

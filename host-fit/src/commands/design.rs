@@ -197,19 +197,15 @@ impl ShortestTime<'_> {
     }
 }
 
-/// The user's command with another target; `None` without a target.
-fn again(line: impl Iterator<Item = String>, target: Option<f64>) -> Option<String> {
-    let target = target?.to_string();
-    let mut words: Vec<String> = line.skip(1).collect();
-    let option = words
-        .iter()
-        .position(|word| word == "--target" || word.starts_with("--target="))?;
+/// The words of a command with another target; `None` if it has none.
+fn again(mut words: Vec<String>, target: f64) -> Option<Vec<String>> {
+    let is_target = |word: &String| word == "--target" || word.starts_with("--target=");
+    let option = words.iter().position(is_target)?;
     match words[option].contains('=') {
         true => words[option] = format!("--target={target}"),
-        false => *words.get_mut(option + 1)? = target,
+        false => *words.get_mut(option + 1)? = target.to_string(),
     }
-    let words: Vec<String> = words.iter().map(|word| page::quoted(word)).collect();
-    Some(format!("host-fit {}", words.join(" ")))
+    Some(words)
 }
 
 impl Args {
@@ -338,10 +334,9 @@ impl Args {
             targets,
             not_tried: notes,
             noise_from,
-            again: again(
-                std::env::args_os().map(|word| word.to_string_lossy().into_owned()),
-                nearest,
-            ),
+            again: nearest
+                .and_then(|target| again(page::arguments(), target))
+                .map(|words| page::command(&words)),
             file: shell_word(&self.output),
             answer: Answer::default(),
         }
@@ -465,19 +460,19 @@ mod tests {
     #[test]
     fn the_command_is_repeated_with_the_target_that_passes() {
         let line = |text: &str| {
-            let words = text.split(' ').map(str::to_owned);
-            again(words.collect::<Vec<_>>().into_iter(), Some(42.0))
+            let words = text.split(' ').map(str::to_owned).collect();
+            again(words, 42.0).map(|words| page::command(&words))
         };
         assert_eq!(
-            line("/bin/host-fit design m.toml set --target 35 --min-on 5 -o c.toml").as_deref(),
+            line("design m.toml set --target 35 --min-on 5 -o c.toml").as_deref(),
             Some("host-fit design m.toml set --target 42 --min-on 5 -o c.toml")
         );
         assert_eq!(
-            line("host-fit design m.toml --target=35 -o c.toml").as_deref(),
+            line("design m.toml --target=35 -o c.toml").as_deref(),
             Some("host-fit design m.toml --target=42 -o c.toml")
         );
-        assert_eq!(line("host-fit workbench set"), None);
-        assert_eq!(line("host-fit design m.toml --target"), None);
+        assert_eq!(line("workbench set"), None);
+        assert_eq!(line("design m.toml --target"), None);
     }
 
     #[test]

@@ -1,19 +1,20 @@
 //! Results as pictures.
 
 use closed_loop::Trace;
-use host_fit::data::Record;
+use host_fit::data::{Plant, Record};
 use host_fit::design::{Margin, Proof};
-use host_fit::diagnose::{Diagnosis, RULES};
+use host_fit::diagnose::{Diagnosis, RULES, Ranked};
 use host_fit::experiment::Separation;
 use host_fit::indicators::ErrorKind;
 use host_fit::picture::{
-    ClosedLoop, LabelledRun, Ladder, LadderRecord, LadderStep, LoopRun, Overlay, Picture, Region,
-    Regions, closed_loop, ladder, overlay, regions,
+    Candidate, ClosedLoop, LabelledRun, Ladder, LadderRecord, LadderStep, LoopRun, Overlay,
+    Picture, Ranking, Region, Regions, closed_loop, ladder, overlay, ranking, regions, significant,
 };
 use host_fit::simulate::Signals;
+use host_fit::steps::effect_in_words;
 
 use super::page_parts::measured;
-use super::words::role_name;
+use super::words::{is_told, named_first, role_name};
 
 /// One picture per record: measurement and free runs, labelled.
 pub(crate) fn overlays(records: &[Record], runs: &[(&str, &[Vec<f64>])]) -> Vec<(String, Picture)> {
@@ -264,5 +265,54 @@ pub(crate) fn loop_picture(picture: &LoopPicture<'_>) -> Picture {
         reference: picture.reference,
         runs: &runs,
         window_s: Some((0.0, picture.seconds)),
+    })
+}
+
+/// How the errors of the candidates and of their base model were obtained.
+pub(super) fn candidates_caption(diagnosis: &Diagnosis) -> String {
+    let error = diagnosis.held_out_by.judged().name();
+    let runs = diagnosis.restarted_s.map_or_else(
+        || "free runs".to_owned(),
+        |seconds| format!("runs restarted every {} s", significant(seconds, 3)),
+    );
+    format!(
+        "Each effect alone is added to the same base model and refitted together with all other parameters. The grey \
+         line is the base model without the candidate. All values are {error}s of {runs}."
+    )
+}
+
+/// Every candidate's error.
+pub(super) fn ranking_picture(diagnosis: &Diagnosis, plant: Plant) -> Picture {
+    let kind = diagnosis.held_out_by.judged();
+    let ranked = named_first(diagnosis).into_iter();
+    let ranked: Vec<_> = ranked.filter(|r| is_told(r, diagnosis)).collect();
+    let names: Vec<String> = ranked
+        .iter()
+        .map(|r| effect_in_words(&r.effect, plant))
+        .collect();
+    let candidate = |(r, name)| {
+        let r: &Ranked = r;
+        let name: &String = name;
+        Candidate {
+            name,
+            rmse: r.validate_rmse,
+            low: f64::NAN,
+            high: f64::NAN,
+            accepted: diagnosis.missing.contains(&r.effect),
+            note: match r.significant || diagnosis.missing.contains(&r.effect) {
+                true => "",
+                false if r.p_value > RULES.level => "not significant",
+                false => "below the practical margin",
+            },
+        }
+    };
+    let candidates: Vec<Candidate<'_>> = ranked.into_iter().zip(&names).map(candidate).collect();
+    ranking(&Ranking {
+        title: &format!("{} with each effect", kind.title()),
+        y_unit: "y",
+        error: kind.title(),
+        candidates: &candidates,
+        base_rmse: Some(diagnosis.candidates_base_rmse),
+        noise_rmse: diagnosis.ladder.last().and_then(|rung| rung.noise_rmse),
     })
 }

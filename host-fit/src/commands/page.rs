@@ -1,13 +1,11 @@
 //! Results as pages.
 
 use host_fit::data::{DataSet, Plant, Record};
-use host_fit::diagnose::{Diagnosis, RULES};
 use host_fit::discover::{Entry, FoundTerm, TRACED, Trace};
 use host_fit::indicators::{ErrorKind, Indicators, Scores, score};
 use host_fit::model::Model;
 use host_fit::picture::{
-    BandPoint, Candidate, Column, CurvePlot, Living, Picture, Ranking, Report, Stretches,
-    WhereItFails, curve, ranking, significant,
+    BandPoint, Column, CurvePlot, Living, Picture, Report, Stretches, WhereItFails, curve,
 };
 use host_fit::residual::Failures;
 use host_fit::steps::{
@@ -15,15 +13,15 @@ use host_fit::steps::{
 };
 
 use super::drawings::{
-    before_and_after_picture, errors_picture, experiment_picture, ladder_picture, margin_picture,
-    proof_picture, step_by_step,
+    before_and_after_picture, candidates_caption, errors_picture, experiment_picture,
+    ladder_picture, margin_picture, proof_picture, ranking_picture, step_by_step,
 };
 use super::page_parts::{Run, Stretch, card, checks, stretch_picture, worst_stretch};
 use super::tried::Tried;
 use super::words::{
-    PARAMETERS, SIDE_BY_SIDE, TRIALS, Words, describe, dropped_terms, has_envelope, is_told,
-    ladder_caption, ladder_rows, named_first, parameter_rows, ranking_rows, role_name, score_rows,
-    screened_only, side_by_side_rows, trial_caption, trial_rows,
+    PARAMETERS, SIDE_BY_SIDE, TRIALS, Words, describe, dropped_terms, has_envelope, ladder_caption,
+    ladder_rows, parameter_rows, ranking_rows, role_name, score_rows, screened_only,
+    side_by_side_rows, trial_caption, trial_rows,
 };
 
 /// The page of a comparison, made by `command`.
@@ -707,55 +705,6 @@ fn report_candidates(report: &mut Report, found: &Finding) {
     }
 }
 
-/// How the errors of the candidates and of their base model were obtained.
-fn candidates_caption(diagnosis: &Diagnosis) -> String {
-    let error = diagnosis.held_out_by.judged().name();
-    let runs = diagnosis.restarted_s.map_or_else(
-        || "free runs".to_owned(),
-        |seconds| format!("runs restarted every {} s", significant(seconds, 3)),
-    );
-    format!(
-        "Each effect alone is added to the same base model and refitted together with all other parameters. The grey \
-         line is the base model without the candidate. All values are {error}s of {runs}."
-    )
-}
-
-/// Every candidate's error.
-pub(super) fn ranking_picture(diagnosis: &Diagnosis, plant: Plant) -> Picture {
-    let kind = diagnosis.held_out_by.judged();
-    let ranked = named_first(diagnosis).into_iter();
-    let ranked: Vec<_> = ranked.filter(|r| is_told(r, diagnosis)).collect();
-    let names: Vec<String> = ranked
-        .iter()
-        .map(|r| effect_in_words(&r.effect, plant))
-        .collect();
-    let candidate = |(r, name)| {
-        let r: &host_fit::diagnose::Ranked = r;
-        let name: &String = name;
-        Candidate {
-            name,
-            rmse: r.validate_rmse,
-            low: f64::NAN,
-            high: f64::NAN,
-            accepted: diagnosis.missing.contains(&r.effect),
-            note: match r.significant || diagnosis.missing.contains(&r.effect) {
-                true => "",
-                false if r.p_value > RULES.level => "not significant",
-                false => "below the practical margin",
-            },
-        }
-    };
-    let candidates: Vec<Candidate<'_>> = ranked.into_iter().zip(&names).map(candidate).collect();
-    ranking(&Ranking {
-        title: &format!("{} with each effect", kind.title()),
-        y_unit: "y",
-        error: kind.title(),
-        candidates: &candidates,
-        base_rmse: Some(diagnosis.candidates_base_rmse),
-        noise_rmse: diagnosis.ladder.last().and_then(|rung| rung.noise_rmse),
-    })
-}
-
 /// The section with tool, data and command.
 pub(crate) fn provenance(report: &mut Report, set: &DataSet, seed: u64, command: &str) {
     report.provenance("tool", concat!("host-fit ", env!("CARGO_PKG_VERSION")));
@@ -767,8 +716,20 @@ pub(crate) fn provenance(report: &mut Report, set: &DataSet, seed: u64, command:
 
 /// The user's command line, quoted for a shell.
 pub(super) fn command_line() -> String {
+    command(&arguments())
+}
+
+/// The words of the user's command line after the program.
+pub(super) fn arguments() -> Vec<String> {
     let words = std::env::args_os().skip(1);
-    let words = words.map(|word| quoted(&word.to_string_lossy()));
+    words
+        .map(|word| word.to_string_lossy().into_owned())
+        .collect()
+}
+
+/// A command of this program, quoted for a shell.
+pub(super) fn command(words: &[String]) -> String {
+    let words = words.iter().map(|word| quoted(word));
     let all: Vec<String> = std::iter::once("host-fit".to_owned())
         .chain(words)
         .collect();

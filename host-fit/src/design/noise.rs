@@ -93,11 +93,4 @@ mod tests {
         let later = coloured * (-10.0 / RULES.noise_memory).exp();
         assert!((lagged(10) / later - 1.0).abs() < 0.1, "{}", lagged(10));
     }
-
-    #[test]
-    fn an_unknown_offset_counts_as_friction() {
-        let flow = Noisy::new(Still, 1.0, 3);
-        let (plain, moved) = (flow.friction(), flow.clone().with_zero(-0.2).friction());
-        assert!((moved - plain + 0.2).abs() < 1e-12);
-    }
 }

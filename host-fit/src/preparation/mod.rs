@@ -18,7 +18,7 @@ pub use rest::MovingZero;
 pub use rules::{RULES, Rules};
 
 use crate::baseline::Baselines;
-use crate::data::import::two_levels;
+use crate::data::import::near_two_levels;
 use crate::data::{Record, Use};
 use crate::model::CommandRange;
 use beginning::Beginning;
@@ -156,7 +156,7 @@ impl Preparation {
         }
         if levels::two_levels(&self.records).is_none() {
             let all = self.records.iter().flat_map(|r| r.u.iter().copied());
-            let near = two_levels(&all.collect::<Vec<f64>>());
+            let near = near_two_levels(&all.collect::<Vec<f64>>());
             let words = |v: f64| crate::picture::significant(v, 2);
             remarks.extend(near.map(|(low, high)| {
                 format!(

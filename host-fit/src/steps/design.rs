@@ -422,14 +422,42 @@ impl Controlled for NoStress {
 mod tests {
     use super::*;
 
-    /// The error of the model is the noise of single readings, unless the records are averages.
-    #[test]
-    fn the_noise_of_a_law_is_that_of_the_records() {
-        let model = Model {
+    /// A first-order flow that ends at 0.8.
+    fn flow() -> Model {
+        Model {
             a: vec![0.97],
             b: vec![0.024],
             ..Model::default()
+        }
+    }
+
+    /// A sensor that reads 0.1 more than the law assumes: the law holds the reading, which is what a user sees.
+    #[test]
+    fn a_plant_is_judged_by_what_its_sensor_reads() {
+        let model = flow();
+        let request = DesignRequest::Track(TrackRequest::holding(0.4));
+        let law = design(&model, &request).expect("a law");
+        let mut off = model.clone();
+        off.add(&model_core::effects::ZERO_OFFSET, &[0.1], None);
+        let possible = PossibleFlow {
+            name: "off".to_owned(),
+            p_value: 0.5,
+            model: off,
         };
+        let proof = try_out::<NoStress>(&law, &[possible], &[], 1);
+        let mean = |name: &str| {
+            let mut cases = proof.cases.iter();
+            let case = cases.find(|case| case.name == name);
+            case.expect("the trial").figures.mean
+        };
+        assert!((mean("off") - 0.4).abs() < 0.03, "{}", mean("off"));
+        assert!((mean("off") - mean("the model, noisy sensor")).abs() < 0.03);
+    }
+
+    /// The error of the model is the noise of single readings, unless the records are averages.
+    #[test]
+    fn the_noise_of_a_law_is_that_of_the_records() {
+        let model = flow();
         let u: Vec<f64> = (0..2000)
             .map(|k| f64::from(u8::from(k / 90 % 2 == 1)))
             .collect();
@@ -460,12 +488,7 @@ mod tests {
 
     #[test]
     fn a_finished_model_leads_to_a_law_or_to_an_export() {
-        let flow = Model {
-            a: vec![0.97],
-            b: vec![0.024],
-            ..Model::default()
-        };
-        // The flow ends at 0.8.
+        let flow = flow();
         assert_eq!(
             command_after(&flow),
             "host-fit design model.toml DATASET --target 0.4 -o controlled.toml"

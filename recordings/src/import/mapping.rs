@@ -265,7 +265,7 @@ impl Mapping {
             for value in &mut command {
                 *value = f64::from(u8::from(*value > threshold));
             }
-        } else if let Some((low, high)) = two_levels(&command) {
+        } else if let Some((low, high)) = near_two_levels(&command) {
             remarks.push(format!(
                 "u takes values near {} and {}: if this is an on/off command, use --u-threshold {}",
                 brief(low, 2),
@@ -432,7 +432,7 @@ fn held(
 /// Two values near which a command lies, if it is a noisy or scaled on/off command: its lowest and its highest value.
 /// `None` if it is 0 and 1 only, or has other values.
 #[must_use]
-pub fn two_levels(u: &[f64]) -> Option<(f64, f64)> {
+pub fn near_two_levels(u: &[f64]) -> Option<(f64, f64)> {
     let low = u.iter().copied().fold(f64::INFINITY, f64::min);
     let high = u.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let on_off = u.iter().all(|&v| v == 0.0 || v == 1.0);

@@ -19,7 +19,7 @@ mod stamp;
 mod text;
 mod timing;
 
-pub use mapping::{Mapping, two_levels};
+pub use mapping::{Mapping, near_two_levels};
 pub use problem::ImportProblem;
 pub use source::{Source, Variable};
 

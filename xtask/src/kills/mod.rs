@@ -18,7 +18,7 @@ use tree::{Entry, LINKED, Tree};
 
 pub(crate) const TASK: Task = Task {
     name: "kills",
-    does: "kills every command that writes files before each change of a file, and checks what is left; --kills N \
+    does: "kills every command that writes files before each change of a file, and checks its outputs; --kills N \
          (default 10000), --seed S (1), --minutes M: stop after M minutes",
     run: kills,
 };
@@ -281,7 +281,7 @@ impl<'a> Trial<'a> {
             }
             self.check(counts).with_context(|| {
                 format!(
-                    "`host-fit {}`, outputs {:?} before, killed before {} {}; what is left is in {}",
+                    "`host-fit {}`, outputs {:?} before, killed before {} {}; the files after it are in {}",
                     self.line.arguments,
                     self.state,
                     point.call,

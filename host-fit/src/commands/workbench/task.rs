@@ -349,7 +349,7 @@ impl Task {
                 "rows".to_owned(),
                 every_candidate(&found.diagnosis, Plant::Flow).into(),
             );
-            let picture = page::ranking_picture(&found.diagnosis, found.plant);
+            let picture = drawings::ranking_picture(&found.diagnosis, found.plant);
             kept.insert("picture".to_owned(), picture.html().into());
             let experiment = separation.map(|s| drawings::experiment_picture(s).html());
             kept.insert("experiment_picture".to_owned(), experiment.into());

@@ -438,7 +438,7 @@ mod tests {
         let request = DesignRequest::Track(TrackRequest::holding(0.4));
         let law = design(&model, &request).expect("a law");
         let mut off = model.clone();
-        off.add(&model_core::effects::ZERO_OFFSET, &[0.1], None);
+        off.add(model_core::effects::ZERO_OFFSET, &[0.1], None);
         let possible = PossibleFlow {
             name: "off".to_owned(),
             p_value: 0.5,

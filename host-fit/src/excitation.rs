@@ -6,8 +6,8 @@
 //! show how many delays are linearly independent.
 
 use crate::data::{DataSet, FilePlace, Record, Use};
-use crate::linalg::symmetric_eigenvalues;
 use crate::rules;
+use numerics::linalg::symmetric_eigenvalues;
 
 rules! {
     /// Excitation: criteria for the commands of a data set, and limits beyond which a remark is

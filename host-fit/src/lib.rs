@@ -75,7 +75,6 @@ pub mod target;
 pub mod terms;
 pub mod user_effect;
 
-mod linalg;
 mod order;
 mod parallel;
 

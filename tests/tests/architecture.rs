@@ -22,9 +22,10 @@ fn dependencies(package: &str) -> BTreeSet<String> {
 }
 
 /// The crates from bottom to top, each with its allowed dependencies.
-const CRATES: [(&str, &[&str]); 8] = [
+const CRATES: [(&str, &[&str]); 9] = [
     ("model-core", &[]),
     ("wire", &["model-core"]),
+    ("numerics", &[]),
     ("recordings", &[]),
     ("rig-line", &["recordings", "wire"]),
     ("workbench", &["recordings"]),
@@ -38,6 +39,7 @@ const CRATES: [(&str, &[&str]); 8] = [
             "closed-loop",
             "firmware-sim",
             "model-core",
+            "numerics",
             "recordings",
             "rig-line",
             "workbench",

@@ -224,7 +224,13 @@ fn comments(path: &Path) -> String {
 #[test]
 fn elliptic_phrases_are_in_no_comment_and_on_no_page() {
     let mut files = Vec::new();
-    for package in ["model-core", "recordings", "host-fit", "firmware-sim"] {
+    for package in [
+        "model-core",
+        "numerics",
+        "recordings",
+        "host-fit",
+        "firmware-sim",
+    ] {
         sources(&root().join(package).join("src"), &mut files);
     }
     files.retain(|file| file.extension().is_some_and(|e| e == "rs"));

@@ -4,8 +4,7 @@ use super::Residuals;
 use super::response::small_step;
 use super::spectrum::Segments;
 use crate::model::Model;
-use realfft::RealFftPlanner;
-use realfft::num_complex::Complex;
+use numerics::fourier::{Complex, Fourier};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 /// A frequency response at one frequency.
@@ -82,11 +81,8 @@ pub fn frequency_response(model: &Model, command: u8, longest_s: f64) -> Option<
     let length = 4 * impulse.len().max(wanted);
     let length = length.next_power_of_two();
     // The response is transformed without its dead time, which is added to the phase afterwards.
-    let mut input = impulse.get(dead_time..)?.to_vec();
-    input.resize(length, 0.0);
-    let transform = RealFftPlanner::new().plan_fft_forward(length);
-    let mut lines = transform.make_output_vec();
-    transform.process(&mut input, &mut lines).ok()?;
+    let input = impulse.get(dead_time..)?.to_vec();
+    let lines = Fourier::new(length).lines(input);
     let finest = 1.0 / (length as f64 * period);
     let mut last = 0.0;
     let all = lines.iter().enumerate().map(|(line, value)| {

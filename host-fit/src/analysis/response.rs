@@ -1,8 +1,8 @@
 //! Step responses and poles of a model at two operating points: command off, command on.
 
-use crate::linalg::poles as poles_of;
 use crate::model::Model;
 use crate::simulate::Signals;
+use numerics::linalg::poles as poles_of;
 
 /// Responses of the free run to a step of the command at two levels.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -1,10 +1,8 @@
 //! Power spectral density of residuals.
 
 use super::Residuals;
-use realfft::num_complex::Complex;
-use realfft::{RealFftPlanner, RealToComplex};
+use numerics::fourier::{Complex, Fourier};
 use std::f64::consts::TAU;
-use std::sync::Arc;
 
 /// One-sided power spectral densities, in the unit of y squared per Hz. Their integrals over frequency are mean squares.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -28,7 +26,7 @@ pub(super) struct Segments {
     /// Length of a segment, samples; a power of two.
     pub(super) length: usize,
     window: Vec<f64>,
-    transform: Arc<dyn RealToComplex<f64>>,
+    transform: Fourier,
 }
 
 impl Segments {
@@ -45,7 +43,7 @@ impl Segments {
             window: (0..length)
                 .map(|k| 0.5 - 0.5 * (TAU * k as f64 / length as f64).cos())
                 .collect(),
-            transform: RealFftPlanner::new().plan_fft_forward(length),
+            transform: Fourier::new(length),
         })
     }
 
@@ -63,15 +61,8 @@ impl Segments {
         let parts = starts.filter_map(|start| signal.get(start..start + self.length));
         parts.map(|part| {
             let mean = part.iter().sum::<f64>() / self.length as f64;
-            let mut input: Vec<f64> = part
-                .iter()
-                .zip(&self.window)
-                .map(|(v, w)| (v - mean) * w)
-                .collect();
-            let mut lines = self.transform.make_output_vec();
-            // This cannot fail, because the transform was planned for this length.
-            let _ = self.transform.process(&mut input, &mut lines);
-            lines
+            let windowed = part.iter().zip(&self.window).map(|(v, w)| (v - mean) * w);
+            self.transform.lines(windowed.collect())
         })
     }
 }

@@ -4,7 +4,7 @@ use super::initial::InitialState;
 use super::response::Shape;
 use super::series::{Scaling, Series, command_before};
 use crate::data::Record;
-use crate::linalg::Cholesky;
+use numerics::linalg::Cholesky;
 use serde::Serialize;
 
 /// Delays that are tried first, in addition to those near a known dead time.

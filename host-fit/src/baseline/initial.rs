@@ -1,6 +1,6 @@
 //! The initial state of a free run, estimated from the start of the record.
 
-use crate::linalg::dot;
+use numerics::linalg::dot;
 use std::ops::Range;
 
 /// Smallest number of samples of a record from which its initial state is estimated.

@@ -3,7 +3,7 @@
 use super::initial::{InitialState, inner};
 use super::response::Response;
 use super::series::Series;
-use crate::linalg::{Cholesky, dot};
+use numerics::linalg::{Cholesky, dot};
 
 /// Sums of products of the columns 1, x and y.
 #[derive(Clone, Copy, Debug, Default)]

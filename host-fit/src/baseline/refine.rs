@@ -5,8 +5,8 @@ use super::projection::{Projection, project};
 use super::response::{Response, Shape};
 use super::series::Series;
 use super::starts::Start;
-use crate::linalg::{dot, solve_symmetric};
 use crate::order;
+use numerics::linalg::{dot, solve_symmetric};
 
 /// Largest number of Gauss–Newton steps.
 const STEPS: usize = 20;

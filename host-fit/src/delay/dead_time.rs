@@ -15,7 +15,7 @@ use super::linear::{Evaluation, Free, LARGEST_RATIO, Refined, Series, refine};
 use super::plant::Plant;
 use super::rules::RULES;
 use super::spread::spread;
-use crate::linalg::dot;
+use numerics::linalg::dot;
 use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 
 /// An estimate of a dead time.

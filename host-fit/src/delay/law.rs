@@ -9,7 +9,7 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::rules::RULES;
 use super::verdict::DelayVerdict;
-use crate::linalg;
+use numerics::linalg;
 
 /// A point of the law: averaged output (1) at the response, delay in samples.
 #[derive(Debug, Clone, Copy, PartialEq)]

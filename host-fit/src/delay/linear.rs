@@ -10,8 +10,8 @@ use super::plant::{Plant, Switching};
 use super::spread::mean;
 use super::white::without_outliers;
 use crate::data::Record;
-use crate::linalg::{dot, dots, gram, solve_symmetric};
 use crate::order;
+use numerics::linalg::{dot, dots, gram, solve_symmetric};
 
 /// Largest number of samples for the grid search; longer records are decimated.
 const COARSE_SAMPLES: usize = 2_000;

@@ -21,7 +21,7 @@ use super::edge::Edge;
 use super::front::{Expectation, expect, level_filter, own_front};
 use super::rules::RULES;
 use super::spread::mean;
-use crate::linalg::dot;
+use numerics::linalg::dot;
 
 /// Why the delay of an edge could not be measured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]

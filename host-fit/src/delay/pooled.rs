@@ -7,7 +7,7 @@ use super::plant::Plant;
 use super::rules::RULES;
 use super::white::white_noise;
 use crate::data::Record;
-use crate::linalg::dot;
+use numerics::linalg::dot;
 
 /// Samples of the refinement; longer records are decimated as far as the time constants allow.
 const FIT_SAMPLES: usize = 12_000;

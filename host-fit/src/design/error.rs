@@ -20,7 +20,7 @@ pub enum DesignError {
     Unreachable(#[from] Unreachable),
     /// The model's poles could not be found.
     #[error(transparent)]
-    NotConverged(#[from] crate::linalg::NotConverged),
+    NotConverged(#[from] numerics::linalg::NotConverged),
     /// The law's constants do not fit the model.
     #[error(transparent)]
     Unusable(#[from] Unusable),

@@ -11,10 +11,10 @@
 use super::rules::RULES;
 use crate::data::Record;
 use crate::fit::{FitOptions, RULES as FIT, fit, sensitivities};
-use crate::linalg::{dot, inverse_where_known};
 use crate::model::Model;
 use crate::parallel;
 use crate::simulate::SimulateError;
+use numerics::linalg::{dot, inverse_where_known};
 use statrs::distribution::{ContinuousCDF, Normal};
 
 /// Free runs over the scored samples, one per record, y.

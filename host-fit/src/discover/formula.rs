@@ -1,6 +1,6 @@
 //! Standard functions to replace a fitted curve.
 
-use crate::linalg::{dot, gram, solve_symmetric};
+use numerics::linalg::{dot, gram, solve_symmetric};
 
 /// Dimension of a parameter of a form.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -12,11 +12,11 @@ use super::place::{Entry, Place};
 use super::screening::{ON, room};
 use crate::data::Record;
 use crate::fit::sensitivities;
-use crate::linalg::{Cholesky, dot};
 use crate::model::Model;
 use crate::parallel;
 use crate::terms::{Judge, Judged, Units};
 use crate::user_effect::Definition;
+use numerics::linalg::{Cholesky, dot};
 use serde::Serialize;
 use std::collections::BTreeMap;
 

@@ -10,7 +10,7 @@
 
 use super::levenberg::Part;
 use super::rules::RULES;
-use crate::linalg::{dot, dots, gram, inverse_where_known};
+use numerics::linalg::{dot, dots, gram, inverse_where_known};
 use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 use std::ops::Range;
 

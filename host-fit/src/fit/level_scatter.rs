@@ -11,7 +11,7 @@
 
 use super::rules::RULES;
 use crate::data::Record;
-use crate::linalg::dot;
+use numerics::linalg::dot;
 
 /// The relative scatter of a record's level, and the remaining noise.
 #[derive(Clone, Copy, Debug, PartialEq)]

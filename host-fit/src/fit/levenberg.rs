@@ -5,7 +5,7 @@
 //! parallel, and a run with too high a cost is stopped early.
 
 use super::rules::RULES;
-use crate::linalg::{dots, gram, solve_symmetric};
+use numerics::linalg::{dots, gram, solve_symmetric};
 
 // These constants change the number of iterations, not the minimum, and are therefore not rules.
 
@@ -234,7 +234,7 @@ fn bounded_step(a: &[f64], g: &[f64], reach: &[(f64, f64)]) -> Option<Vec<f64>> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::linalg::inverse_where_known;
+    use numerics::linalg::inverse_where_known;
 
     /// A curve fitted through points, unbounded by default.
     struct Curve {

@@ -5,8 +5,8 @@ use thiserror::Error;
 use super::structure::{InputDelay, Structure};
 use crate::data::Record;
 use crate::data::memory::TooMuch;
-use crate::linalg;
 use crate::search::StopReason;
+use numerics::linalg;
 
 /// Why an identification could not be made.
 #[derive(Debug, Clone, Error, PartialEq)]

@@ -8,7 +8,7 @@ use super::arrival::Weights;
 use super::lagged_products::{ONE, TARGET, Table};
 use super::layout::{Column, Delays};
 use super::regression::Regression;
-use crate::linalg::Cholesky;
+use numerics::linalg::Cholesky;
 
 /// A gain with a smaller share of the residual is a rounding error.
 const NEGLIGIBLE: f64 = 1e-7;

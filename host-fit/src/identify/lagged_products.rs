@@ -7,7 +7,7 @@
 //! all samples. A regression needs only look-ups, whatever the length of the records.
 
 use super::arrival::Weights;
-use crate::linalg::{self, dot, dots};
+use numerics::linalg::{self, dot, dots};
 
 /// Regressor elements: 0 is the constant 1, 1 + i is y_{k+1−i} (1 is the target y_{k+1}).
 pub(crate) type Element = usize;

@@ -12,7 +12,7 @@ use super::free_runner::Trajectory;
 use super::lagged_products::ONE;
 use super::layout::{Column, Delays, Layout};
 use super::regression::Regression;
-use crate::linalg;
+use numerics::linalg;
 
 /// Decimation of the samples in the products. It is odd, so that patterns of period two are sampled.
 const STRIDE: usize = 41;

@@ -7,7 +7,7 @@ use super::lagged_products::{LaggedOutputs, TARGET, Table};
 use super::layout::{Column, Delays, Layout};
 use super::structure::{Series, Structure};
 use crate::data::memory::{self, TooMuch};
-use crate::linalg::{self, Cholesky};
+use numerics::linalg::{self, Cholesky};
 
 /// Number of cached tables; the least recently used is dropped. One of 500 lags takes 2 MB.
 const TABLES_KEPT: usize = 48;

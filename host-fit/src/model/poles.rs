@@ -1,7 +1,7 @@
 //! Memory length of a model.
 
 use super::Model;
-use crate::linalg::{NotConverged, largest_pole};
+use numerics::linalg::{NotConverged, largest_pole};
 
 impl Model {
     /// The largest pole modulus of the recursion with all jets off, or on: the factor by which a disturbance

@@ -2,8 +2,8 @@
 
 use super::colour::Deviations;
 use super::{Colour, EFFECTS, NoiseModel, Series, offset_and_drift, woodbury_of};
-use crate::linalg::{dot, dots};
 use crate::parallel;
+use numerics::linalg::{dot, dots};
 
 /// Grid of shares of coloured noise.
 const SHARES: [f64; 6] = [0.1, 0.25, 0.5, 0.75, 0.9, 0.98];

@@ -11,7 +11,7 @@ mod estimate;
 
 pub use colour::{Colour, Filter};
 
-use crate::linalg::{dot, dots};
+use numerics::linalg::{dot, dots};
 
 /// Random effects of a record: offset, drift, level.
 const EFFECTS: usize = 3;

@@ -211,8 +211,8 @@ fn the_likelihood_is_that_of_the_covariance() {
             + model.level * run[i] * run[j]
     };
     let covariance: Vec<f64> = (0..n * n).map(|at| cell(at / n, at % n)).collect();
-    let solved = crate::linalg::solve_symmetric(&covariance, &residual).expect("positive");
-    let eigenvalues = crate::linalg::symmetric_eigenvalues(&covariance, n).expect("symmetric");
+    let solved = numerics::linalg::solve_symmetric(&covariance, &residual).expect("positive");
+    let eigenvalues = numerics::linalg::symmetric_eigenvalues(&covariance, n).expect("symmetric");
     let log_determinant: f64 = eigenvalues.iter().map(|e| e.ln()).sum();
     let expected = -0.5 * (dot(&residual, &solved) + log_determinant);
     let found = model.metric(&variance, &run).log_likelihood(&residual);

@@ -6,7 +6,7 @@
 
 use super::RULES;
 use crate::data::{Record, Use};
-use crate::linalg::{dot, dots, gram, inverse_where_known};
+use numerics::linalg::{dot, dots, gram, inverse_where_known};
 
 /// `records` with u moved up by one row, if y responds to the command of its own row.
 pub(super) fn in_own_row(records: &[Record]) -> Option<Vec<Record>> {

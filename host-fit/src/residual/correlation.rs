@@ -1,7 +1,7 @@
 //! Tests on correlated errors: blocks that count as independent, and whether their sum is above 0.
 
 use super::rules::RULES;
-use crate::linalg::dot;
+use numerics::linalg::dot;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 /// Standard deviation of a normal distribution over its median absolute deviation.

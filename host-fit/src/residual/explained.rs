@@ -3,7 +3,7 @@
 use super::binned::{Binned, Folds};
 use super::correlation::p_above;
 use super::rules::RULES;
-use crate::linalg::dot;
+use numerics::linalg::dot;
 use statrs::distribution::{ContinuousCDF, Normal};
 use std::collections::BTreeMap;
 

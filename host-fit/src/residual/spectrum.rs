@@ -5,7 +5,7 @@ use super::explained::Errors;
 use super::rules::RULES;
 use super::{Interval, Where};
 use crate::picture::FailureBin;
-use realfft::{RealFftPlanner, RealToComplex};
+use numerics::fourier::Fourier;
 
 /// Energies of one segment in each band.
 struct Piece {
@@ -24,7 +24,7 @@ pub(super) fn by_frequency(errors: &Errors, excess: f64) -> Option<Where> {
         limits.push((limits.last()? * 2.0).min(length as f64 / 2.0));
     }
     let bands = limits.len() - 1;
-    let transform = RealFftPlanner::new().plan_fft_forward(length);
+    let transform = Fourier::new(length);
     let mut pieces = Vec::new();
     for (record, e) in errors.residual.iter().enumerate() {
         let (simulated, noise) = (&errors.simulated[record], &errors.noise[record]);
@@ -32,8 +32,8 @@ pub(super) fn by_frequency(errors: &Errors, excess: f64) -> Option<Where> {
         while from + length <= e.len() {
             let span = from..from + length;
             pieces.push(Piece {
-                error: energies(&*transform, &e[span.clone()], &limits),
-                model: energies(&*transform, &simulated[span.clone()], &limits),
+                error: energies(&transform, &e[span.clone()], &limits),
+                model: energies(&transform, &simulated[span.clone()], &limits),
                 noise: noise[span].iter().sum(),
             });
             from += length;
@@ -121,13 +121,10 @@ pub(super) fn by_frequency(errors: &Errors, excess: f64) -> Option<Where> {
 }
 
 /// Energy of the spectral lines in each band, scaled so that all bands sum to Σ x² without the mean.
-fn energies(transform: &dyn RealToComplex<f64>, x: &[f64], limits: &[f64]) -> Vec<f64> {
+fn energies(transform: &Fourier, x: &[f64], limits: &[f64]) -> Vec<f64> {
     let n = x.len();
     let mean = x.iter().sum::<f64>() / n as f64;
-    let mut deviations: Vec<f64> = x.iter().map(|x| x - mean).collect();
-    let mut lines = transform.make_output_vec();
-    // This cannot fail, because the transform was planned for pieces of this length.
-    let _ = transform.process(&mut deviations, &mut lines);
+    let lines = transform.lines(x.iter().map(|x| x - mean).collect());
     let band = |band: &[f64]| {
         let within = (band[0].floor() as usize + 1)..=(band[1] as usize);
         let energy = within.map(|i| {
@@ -152,8 +149,8 @@ mod tests {
         let limits = [
             0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 128.0, 256.0, 512.0,
         ];
-        let transform = RealFftPlanner::new().plan_fft_forward(x.len());
-        let bands = energies(&*transform, &x, &limits);
+        let transform = Fourier::new(x.len());
+        let bands = energies(&transform, &x, &limits);
         let mean = x.iter().sum::<f64>() / 1024.0;
         let energy: f64 = x.iter().map(|x| (x - mean) * (x - mean)).sum();
         assert!((bands.iter().sum::<f64>() / energy - 1.0).abs() < 1e-12);

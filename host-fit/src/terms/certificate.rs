@@ -4,10 +4,10 @@ use super::judge::Judge;
 use super::likelihood::{Weighed, errors, evidence, normal_equations, weighed};
 use crate::data::Record;
 use crate::fit::fit;
-use crate::linalg::inverse_where_known;
 use crate::model::Model;
 use crate::noise::NoiseModel;
 use crate::residual::NoiseSource;
+use numerics::linalg::inverse_where_known;
 
 /// Number of Gauss–Newton steps in the metric of the noise after least squares, and of halvings of each step.
 const STEPS: usize = 8;

@@ -1,8 +1,8 @@
 //! Comparison of two models on validation records: effect size, significance under correlated errors, and the
 //! gain expected under noise alone.
 
-use crate::linalg::dot;
 use crate::residual::{correlation_length, independent_block, p_above, student};
+use numerics::linalg::dot;
 
 /// Free-run error y − y_sim of a model on the validation records, without the warm-up.
 #[derive(Clone, Debug)]

@@ -13,11 +13,11 @@ use super::search::{Found, Search};
 use super::table::Table;
 use super::term::Term;
 use crate::fit::{Fit, FitOptions, fit, settle_fixed_delay};
-use crate::linalg::{dot, solve_symmetric};
 use crate::model::Model;
 use crate::order;
 use crate::parallel;
 use model_core::effect::Place;
+use numerics::linalg::{dot, solve_symmetric};
 
 /// An effect together with the base terms that are predicted to be needed with it.
 struct Begun {

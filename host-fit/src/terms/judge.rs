@@ -5,12 +5,12 @@ use super::evidence::{HeldOut, p_above_noise};
 use super::folds::{Fold, HeldOutBy, Judging, folds};
 use crate::data::{Record, Use};
 use crate::fit::{Fit, FitOptions, LevelScatter, fit, pieces_of};
-use crate::linalg::dot;
 use crate::model::Model;
 use crate::parallel;
 use crate::residual::{NoiseSource, noise_floor};
 use crate::simulate::SimulateError;
 use model_core::recursion::Grading;
+use numerics::linalg::dot;
 
 /// A model with its fits, one per fold, and its validation error.
 #[derive(Clone, Debug)]

@@ -3,11 +3,11 @@
 use super::judge::Judge;
 use crate::data::Record;
 use crate::fit::sensitivities;
-use crate::linalg::{dot, inverse_where_known, symmetric_eigenvalues};
 use crate::model::{Coordinate, Model};
 use crate::noise::{Metric, NoiseModel, Series, Whitened};
 use crate::parallel;
 use crate::residual::{NoiseSource, noise_floor};
+use numerics::linalg::{dot, inverse_where_known, symmetric_eigenvalues};
 
 /// The range of a parameter in standard deviations of its prior.
 const RANGE: f64 = 4.0;

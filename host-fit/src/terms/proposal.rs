@@ -4,11 +4,11 @@ use super::RULES;
 use super::screen::Screen;
 use super::table::{Candidate, Table};
 use super::term::Term;
-use crate::linalg::{dot, solve_symmetric};
 use crate::model::Model;
 use crate::order;
 use crate::parallel;
 use model_core::effect::{Place, Spec};
+use numerics::linalg::{dot, solve_symmetric};
 
 /// Terms to add together, with their predicted gain.
 #[derive(Clone, Debug)]

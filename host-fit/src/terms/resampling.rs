@@ -2,7 +2,7 @@
 
 use super::RULES;
 use super::evidence::HeldOut;
-use crate::linalg::dot;
+use numerics::linalg::dot;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

@@ -15,10 +15,10 @@ use super::judge::Judge;
 use super::term::Term;
 use crate::data::Record;
 use crate::fit::{channel_reference, sensitivities};
-use crate::linalg::{dot, gram, solve_symmetric};
 use crate::model::{Delay, Model};
 use crate::parallel;
 use model_core::effect::Spec;
+use numerics::linalg::{dot, gram, solve_symmetric};
 use std::ops::Range;
 
 /// First-order prediction for all parameters of one effect together.

@@ -4,9 +4,9 @@ use super::screen::Screen;
 use super::table::Table;
 use super::term::Term;
 use crate::fit::Known;
-use crate::linalg::{dot, dots};
 use crate::model::Model;
 use crate::parallel;
+use numerics::linalg::{dot, dots};
 use std::ops::Range;
 
 /// Two columns are linearly dependent if the residual share of their energy is below this.

@@ -5,13 +5,13 @@ use super::grid::{grid, longest_lag};
 use super::screen::Screen;
 use super::term::Term;
 use crate::fit::{Known, channel_reference, sensitivities};
-use crate::linalg::dot;
 use crate::model::Model;
 use crate::order;
 use crate::parallel;
 use model_core::effect::{Place, Sign, Spec};
 use model_core::effects::{LEVEL_RATE, PATH_TERMS, SLOW_WAKE, ZERO_OFFSET};
 use model_core::recursion::Grading;
+use numerics::linalg::dot;
 
 /// Number of lags whose derivatives one run computes, two each.
 const LAGS_AT_ONCE: usize = 4;

@@ -1,9 +1,9 @@
 //! Dense linear algebra: small systems by our own [`Cholesky`] factor, everything else by faer, which only this
-//! module uses.
+//! module uses. Matrices are slices, row by row.
 
 mod cholesky;
 
-pub(crate) use cholesky::{Cholesky, solve_symmetric};
+pub use cholesky::{Cholesky, solve_symmetric};
 
 use faer::linalg::matmul::matmul;
 use faer::linalg::matmul::triangular::{self, BlockStructure};
@@ -31,7 +31,7 @@ pub struct NotConverged;
 ///
 /// # Errors
 /// [`NotConverged`] when the singular value decomposition fails.
-pub(crate) fn least_squares(columns: &[Vec<f64>], rhs: &[f64]) -> Result<Vec<f64>, NotConverged> {
+pub fn least_squares(columns: &[Vec<f64>], rhs: &[f64]) -> Result<Vec<f64>, NotConverged> {
     let matrix = Mat::from_fn(rhs.len(), columns.len(), |i, j| {
         columns
             .get(j)
@@ -60,7 +60,7 @@ pub(crate) fn least_squares(columns: &[Vec<f64>], rhs: &[f64]) -> Result<Vec<f64
 
 /// Σ a_i·b_i in four partial sums, which the processor can compute in parallel; the order is fixed and the result
 /// repeatable.
-pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
+pub fn dot(a: &[f64], b: &[f64]) -> f64 {
     pulp::Arch::new().dispatch(
         #[inline(always)]
         || {
@@ -79,7 +79,7 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
 
 /// [`dot`] of `a` with each of `others`, four at a time, so that no sum waits for another. The values are those of
 /// [`dot`].
-pub(crate) fn dots<'a>(a: &[f64], others: impl IntoIterator<Item = &'a [f64]>) -> Vec<f64> {
+pub fn dots<'a>(a: &[f64], others: impl IntoIterator<Item = &'a [f64]>) -> Vec<f64> {
     let mut products = Vec::new();
     let mut others = others.into_iter();
     loop {
@@ -94,7 +94,7 @@ pub(crate) fn dots<'a>(a: &[f64], others: impl IntoIterator<Item = &'a [f64]>) -
 }
 
 /// AᵀA from the columns of A, row-major, with the values of [`dot`].
-pub(crate) fn gram(columns: &[&[f64]]) -> Vec<f64> {
+pub fn gram(columns: &[&[f64]]) -> Vec<f64> {
     let n = columns.len();
     let mut gram = vec![0.0; n * n];
     for (i, column) in columns.iter().enumerate() {
@@ -141,7 +141,7 @@ fn four_dots(a: &[f64], others: [&[f64]; 4]) -> [f64; 4] {
 
 /// The inverse of an information matrix (symmetric, row-major, `n` × `n`) in its identified directions, and the
 /// coordinates that belong to the other directions. `None` if the decomposition fails.
-pub(crate) fn inverse_where_known(a: &[f64], n: usize) -> Option<(Vec<f64>, Vec<bool>)> {
+pub fn inverse_where_known(a: &[f64], n: usize) -> Option<(Vec<f64>, Vec<bool>)> {
     let size = |i: usize| a.get(i * n + i).filter(|d| **d > 0.0).map(|d| d.sqrt());
     let sizes: Vec<f64> = (0..n).map(|i| size(i).unwrap_or(1.0)).collect();
     let scaled = Mat::from_fn(n, n, |i, j| a[i * n + j] / (sizes[i] * sizes[j]));
@@ -166,14 +166,14 @@ pub(crate) fn inverse_where_known(a: &[f64], n: usize) -> Option<(Vec<f64>, Vec<
 }
 
 /// Eigenvalues of a symmetric matrix (row-major, `n` × `n`). `None` if the decomposition fails.
-pub(crate) fn symmetric_eigenvalues(a: &[f64], n: usize) -> Option<Vec<f64>> {
+pub fn symmetric_eigenvalues(a: &[f64], n: usize) -> Option<Vec<f64>> {
     let matrix = Mat::from_fn(n, n, |i, j| a[i * n + j]);
     matrix.self_adjoint_eigenvalues(Side::Lower).ok()
 }
 
 /// Adds AᵀB to `out`; A and B are `rows` × `size`, column by column, `out` is `size` × `size`, column by column.
 /// Slices of other lengths are ignored.
-pub(crate) fn add_cross_products(out: &mut [f64], a: &[f64], b: &[f64], rows: usize, size: usize) {
+pub fn add_cross_products(out: &mut [f64], a: &[f64], b: &[f64], rows: usize, size: usize) {
     if out.len() != size * size || a.len() != rows * size || b.len() != rows * size {
         return;
     }
@@ -189,7 +189,7 @@ pub(crate) fn add_cross_products(out: &mut [f64], a: &[f64], b: &[f64], rows: us
 
 /// AᵀSA for a matrix A, column by column, with as many rows as there are `signs`, the diagonal of S. The result is
 /// column by column; only its lower half is filled.
-pub(crate) fn signed_products(a: &[f64], signs: &[f64]) -> Vec<f64> {
+pub fn signed_products(a: &[f64], signs: &[f64]) -> Vec<f64> {
     let rows = signs.len();
     if rows == 0 {
         return Vec::new();
@@ -217,7 +217,7 @@ pub(crate) fn signed_products(a: &[f64], signs: &[f64]) -> Vec<f64> {
 }
 
 /// AᵀB for A and B of `rows` rows. A, B and the result are stored column by column. Incomplete columns are ignored.
-pub(crate) fn cross_products(a: &[f64], b: &[f64], rows: usize) -> Vec<f64> {
+pub fn cross_products(a: &[f64], b: &[f64], rows: usize) -> Vec<f64> {
     if rows == 0 {
         return Vec::new();
     }
@@ -243,7 +243,7 @@ const DENSE: usize = 800;
 ///
 /// # Errors
 /// [`NotConverged`] when the eigenvalue iteration fails.
-pub(crate) fn largest_pole(weights: &[f64]) -> Result<f64, NotConverged> {
+pub fn largest_pole(weights: &[f64]) -> Result<f64, NotConverged> {
     if weights.iter().rposition(|w| *w != 0.0) >= Some(DENSE) {
         return Ok(growth(weights));
     }
@@ -305,7 +305,7 @@ fn pole_magnitudes(weights: &[f64]) -> Result<Vec<f64>, NotConverged> {
 ///
 /// # Errors
 /// [`NotConverged`] when the eigenvalue iteration fails.
-pub(crate) fn poles(weights: &[f64]) -> Result<Vec<(f64, f64)>, NotConverged> {
+pub fn poles(weights: &[f64]) -> Result<Vec<(f64, f64)>, NotConverged> {
     if weights.iter().rposition(|w| *w != 0.0) >= Some(DENSE) {
         return Ok(Vec::new());
     }

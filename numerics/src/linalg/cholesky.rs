@@ -6,7 +6,7 @@ const PIVOT_TOLERANCE: f64 = 1e-12;
 
 /// Lower factor of a positive semi-definite matrix, row by row.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Cholesky {
+pub struct Cholesky {
     n: usize,
     lower: Vec<f64>,
     inverse_diagonal: Vec<f64>,
@@ -14,7 +14,7 @@ pub(crate) struct Cholesky {
 
 impl Cholesky {
     /// Factorises an n × n matrix stored row by row.
-    pub(crate) fn new(gram: &[f64], n: usize) -> Self {
+    pub fn new(gram: &[f64], n: usize) -> Self {
         let mut lower = gram.to_vec();
         let mut inverse_diagonal = vec![0.0; n];
         for i in 0..n {
@@ -39,17 +39,17 @@ impl Cholesky {
     }
 
     /// Entry (i, j) of the factor, j < i.
-    pub(crate) fn below(&self, i: usize, j: usize) -> f64 {
+    pub fn below(&self, i: usize, j: usize) -> f64 {
         self.lower[i * self.n + j]
     }
 
     /// 1 over diagonal entry i; 0 for a column that was left out.
-    pub(crate) fn inverse(&self, i: usize) -> f64 {
+    pub fn inverse(&self, i: usize) -> f64 {
         self.inverse_diagonal[i]
     }
 
     /// L⁻¹ r; its squared length is the part of the target that the columns explain.
-    pub(crate) fn forward(&self, rhs: &[f64]) -> Vec<f64> {
+    pub fn forward(&self, rhs: &[f64]) -> Vec<f64> {
         let mut w = rhs.to_vec();
         for i in 0..self.n {
             let mut sum = w[i];
@@ -62,7 +62,7 @@ impl Cholesky {
     }
 
     /// Solution of L Lᵀ x = r from `forward`; 0 for columns left out.
-    pub(crate) fn backward(&self, mut w: Vec<f64>) -> Vec<f64> {
+    pub fn backward(&self, mut w: Vec<f64>) -> Vec<f64> {
         for i in (0..self.n).rev() {
             w[i] *= self.inverse_diagonal[i];
             for k in 0..i {
@@ -75,7 +75,7 @@ impl Cholesky {
 
 /// Solves A·x = b for a symmetric positive definite A (row-major); `None` if A is not positive definite. The unknowns
 /// may differ in size by many orders.
-pub(crate) fn solve_symmetric(a: &[f64], b: &[f64]) -> Option<Vec<f64>> {
+pub fn solve_symmetric(a: &[f64], b: &[f64]) -> Option<Vec<f64>> {
     let factor = Cholesky::new(a, b.len());
     let complete = factor.inverse_diagonal.iter().all(|inverse| *inverse > 0.0);
     complete.then(|| factor.backward(factor.forward(b)))

@@ -230,8 +230,9 @@ pub enum DataProblem {
     TooLarge(f64),
     /// Time does not increase.
     #[error(
-        "time does not increase: {time} s follows {before} s; sort the rows, remove repeated ones, and print t \
-             with enough digits"
+        "time does not increase: {time} s follows {before} s; if a new run begins there, split the file with \
+             `host-fit import --split-by NAME`, the name of the time or of a column that numbers the runs; \
+             otherwise sort the rows, remove repeated ones, and print t with enough digits"
     )]
     TimeBackward {
         /// The previous row's time.
@@ -242,8 +243,8 @@ pub enum DataProblem {
     /// Samples are missing.
     #[error(
         "time jumps by {step} s where the sampling period is {period} s: about {missing} sample(s) missing; \
-             split the record there, or `host-fit import` it with --fill-gaps SECONDS (if only the times are \
-             wrong: with --period SECONDS --ignore-time)"
+             `host-fit import` it with --split-by NAME, the name of the time, which splits the record there, or \
+             with --fill-gaps SECONDS (if only the times are wrong: with --period SECONDS --ignore-time)"
     )]
     TimeGap {
         /// The step found.

@@ -314,6 +314,7 @@ proptest! {
         changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 0..12),
         cut in prop::option::of(any::<prop::sample::Index>()),
         fill_gaps_s in prop::option::of(0.002..1e9),
+        split_by in prop::option::of(prop::sample::select(vec!["t", "u", "data(:,1)", "valve"])),
     ) {
         let mut bytes = fs::read(file(FILES[which])).unwrap();
         for (at, value) in changes {
@@ -326,9 +327,9 @@ proptest! {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join(FILES[which]);
         fs::write(&path, &bytes).unwrap();
-        let mapping = Mapping { u_threshold: Some(2.5), period_s: Some(0.001), fill_gaps_s, ..Mapping::default() };
+        let mapping = Mapping { u_threshold: Some(2.5), period_s: Some(0.001), fill_gaps_s, split_by: split_by.map(str::to_owned), ..Mapping::default() };
         match import(&[&path], &Import { mapping, ..Import::default() }) {
-            Ok(found) => prop_assert!(found.set.records[0].len() >= 2),
+            Ok(found) => prop_assert!(found.set.records.iter().all(|record| record.len() >= 2)),
             Err(error) => {
                 let text = error.to_string();
                 prop_assert!(!text.contains('\n') && text.contains(FILES[which]), "{}", text);

@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use recordings::import::{Import, Imported, Mapping, files_of, import};
-use recordings::{DataSet, Record};
+use recordings::{DataSet, Record, Use};
 
 fn stranger(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -24,6 +24,10 @@ fn with(change: impl FnOnce(&mut Mapping)) -> Import {
     let mut request = Import::default();
     change(&mut request.mapping);
     request
+}
+
+fn some(name: &str) -> Option<String> {
+    Some(name.to_owned())
 }
 
 /// A file with this text, imported.
@@ -430,6 +434,65 @@ fn short_gaps_are_filled_and_long_ones_named() {
             assert!(error.contains(part), "no `{part}` in: {error}");
         }
     }
+}
+
+/// Two runs of three rows, and a pause of the logger within the second.
+#[test]
+fn a_file_with_several_runs_becomes_several_records() {
+    let rows = "run,t,valve,y\n1,0,0,0.5\n1,0.1,1,0.6\n1,0.2,1,0.7\n\
+                2,0,0,0.1\n2,0.1,1,0.2\n2,0.9,0,0.3\n2,1.0,0,0.4\n";
+    refused(rows, &["line 5", "--split-by"]);
+    let by = |name: &str, change: &dyn Fn(&mut Import)| {
+        let mut request = with(|m| m.split_by = some(name));
+        change(&mut request);
+        text("log.csv", rows, &request)
+    };
+    let told = by("t", &|_| {}).unwrap();
+    let names: Vec<&str> = told.set.records.iter().map(|r| r.name.as_str()).collect();
+    assert_eq!(names, ["log-1", "log-2", "log-3"]);
+    let [_, second, third] = told.set.records.as_slice() else {
+        panic!("{names:?}");
+    };
+    assert_eq!(
+        (second.y.as_slice(), second.t0),
+        ([0.1, 0.2].as_slice(), 0.0)
+    );
+    assert_eq!((third.y.as_slice(), third.t0), ([0.3, 0.4].as_slice(), 0.9));
+    assert!(second.channels.contains_key("run"));
+    // The pause stays a fault of the second run, and is named by its line.
+    let error = by("run", &|_| {}).unwrap_err();
+    assert!(
+        error.contains("line 7") && error.contains("--split-by"),
+        "{error}"
+    );
+    let told = by("run", &|request| {
+        (request.mapping.ignore_time, request.mapping.period_s) = (true, Some(0.1));
+        request.validate = vec!["log-2".to_owned()];
+    });
+    let told = told.unwrap();
+    let [first, second] = told.set.records.as_slice() else {
+        panic!("{:?}", told.files);
+    };
+    assert_eq!((first.role, second.role), (Use::Identify, Use::Validate));
+    assert_eq!((first.len(), second.len()), (3, 4));
+    assert!(
+        first.channels.is_empty(),
+        "the number of the run is no channel"
+    );
+    assert!(by("nothing", &|_| {}).unwrap_err().contains("`run`"));
+}
+
+/// The date of a run is that of its own first row.
+#[test]
+fn runs_with_clock_times_count_from_their_own_first_row() {
+    let rows = "Time,valve,y\n10:00:00,0,1.5\n10:00:01,1,1.6\n10:00:02,1,1.7\n\
+                10:30:00,0,2.5\n10:30:01,0,2.6\n10:30:02,1,2.7\n";
+    let told = text("log.csv", rows, &with(|m| m.split_by = some("Time"))).unwrap();
+    let starts: Vec<f64> = told.set.records.iter().map(|r| r.t0).collect();
+    assert_eq!(starts, [0.0, 0.0]);
+    let remark = |file: usize| told.files[file].remarks.join(" ");
+    assert!(remark(0).contains("(10:00:00)"), "{}", remark(0));
+    assert!(remark(1).contains("(line 5)"), "{}", remark(1));
 }
 
 #[test]

@@ -49,6 +49,10 @@ pub(crate) struct Args {
     /// rows are interpolated, u keeps its value.
     #[arg(long, value_name = "SECONDS", value_parser = positive)]
     fill_gaps: Option<f64>,
+    /// A file has several records: a new one begins where this variable changes (the number of a run), or, if it is
+    /// the time, where the time starts again and after a pause.
+    #[arg(long, value_name = "NAME")]
+    split_by: Option<String>,
     /// Variable that is the command.
     #[arg(long, value_name = "NAME")]
     u: Option<String>,
@@ -79,7 +83,8 @@ pub(crate) struct Args {
     /// Keep only t, u and y.
     #[arg(long, conflicts_with = "channel")]
     no_channels: bool,
-    /// Name of a file (without its ending) that becomes a validation record; repeatable.
+    /// Name of a file (without its ending), or of a record of a file that is split, that becomes a validation record;
+    /// repeatable.
     #[arg(long, value_name = "NAME")]
     validate: Vec<String>,
     /// Split each record at this time, s: the samples after it are a validation record, the samples before it
@@ -125,6 +130,7 @@ impl Args {
             period_s: self.period.or(base.period_s),
             ignore_time: self.ignore_time || base.ignore_time,
             fill_gaps_s: self.fill_gaps.or(base.fill_gaps_s),
+            split_by: self.split_by.clone().or(base.split_by),
             u: self.u.clone().or(base.u),
             u_scale: self.u_scale.or(base.u_scale),
             u_offset: self.u_offset.or(base.u_offset),

@@ -110,7 +110,7 @@ fn unseen(
             .parameters
             .iter()
             .zip(&found.parameters)
-            .map(|(card, value)| value / units.value_out(card.unit, 1.0))
+            .map(|(card, value)| units.value_in(card.unit, *value))
             .collect();
         let flow = judge.refitted(&with_effect(judge, spec, &inner))?;
         Some(PossibleFlow {

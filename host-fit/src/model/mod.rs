@@ -416,7 +416,7 @@ impl Model {
         self.order_effects();
     }
 
-    /// Sorts the effects into physical order: by place; within a place, leading terms first; in the flow, driving
+    /// Sorts the effects into physical order: by place; within a place, by turn; in the flow, driving
     /// effects before resisting ones; then in the order of the catalogue, of the user's own effects, and of the
     /// base terms.
     pub(crate) fn order_effects(&mut self) {
@@ -424,7 +424,7 @@ impl Model {
         let rank = |added: &Added| {
             let index = order.iter().position(|spec| spec.name == added.name)?;
             let spec = order[index];
-            Some((spec.place, !spec.leads, spec.resists, index))
+            Some((spec.place, spec.turn, spec.resists, index))
         };
         self.effects.sort_by_key(rank);
     }

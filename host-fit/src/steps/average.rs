@@ -41,7 +41,7 @@ pub fn average(
     averaging: &Averaging,
     progress: &mut dyn FnMut(usize, u64),
 ) -> Result<Average, StepError> {
-    check_names(recordings, validate)?;
+    check_names(recordings, [], validate)?;
     let (set, recordings) = average_files(recordings, validate, averaging, progress)?;
     Ok(Average {
         hash: set.hash.clone(),
@@ -50,10 +50,17 @@ pub fn average(
     })
 }
 
-/// Rejects names of validation records that none of the files has.
-pub(super) fn check_names(files: &[&Path], validate: &[String]) -> Result<(), StepError> {
+/// Rejects names of validation records that none of the files and of the `records` made of them has.
+pub(super) fn check_names<'a>(
+    files: &[&Path],
+    records: impl IntoIterator<Item = &'a str>,
+    validate: &[String],
+) -> Result<(), StepError> {
     let stems: Vec<_> = files.iter().filter_map(|p| p.file_stem()).collect();
-    let unknown = |name: &&String| !stems.iter().any(|stem| *stem == name.as_str());
+    let records: Vec<&str> = records.into_iter().collect();
+    let unknown = |name: &&String| {
+        !stems.iter().any(|stem| *stem == name.as_str()) && !records.contains(&name.as_str())
+    };
     match validate.iter().find(unknown) {
         Some(name) => Err(StepError::NoSuchRecording(name.clone())),
         None => Ok(()),

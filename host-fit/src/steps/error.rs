@@ -165,6 +165,9 @@ pub enum StepError {
         time_s: f64,
     },
     /// A validation record that does not exist.
-    #[error("--validate {0}: no recording has this name; give a file name without its ending")]
+    #[error(
+        "--validate {0}: no recording has this name; give a file name without its ending, or the name of a record of a \
+         file that is split"
+    )]
     NoSuchRecording(String),
 }

@@ -42,8 +42,16 @@ pub struct ImportedSet {
 pub fn import(files: &[&Path], request: &Import) -> Result<ImportedSet, StepError> {
     let files = import::files_of(files)?;
     let files: Vec<&Path> = files.iter().map(PathBuf::as_path).collect();
-    super::average::check_names(&files, &request.validate)?;
+    // Records of a file that is split have names when the file is read.
+    let is_split = request.mapping.split_by.is_some();
+    if !is_split {
+        super::average::check_names(&files, [], &request.validate)?;
+    }
     let imported = import::import(&files, request)?;
+    if is_split {
+        let records = imported.files.iter().map(|file| file.name.as_str());
+        super::average::check_names(&files, records, &request.validate)?;
+    }
     Ok(ImportedSet {
         hash: imported.set.hash.clone(),
         sample_period_s: imported.set.sample_period_s,

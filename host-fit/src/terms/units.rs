@@ -7,9 +7,9 @@
 use super::RULES;
 use crate::data::Record;
 use crate::fit::RULES as FIT;
-use crate::model::{CommandRange, Delay, Model, Start};
+use crate::model::{Added, CommandRange, Delay, Model, Start};
 use crate::preparation::Preparation;
-use model_core::effect::{Place, Spec};
+use model_core::effect::{Place, Spec, Unit};
 use model_core::effects::ZERO_OFFSET;
 
 /// The sample period that cards are written for, s.
@@ -194,8 +194,23 @@ impl Units {
 
     /// A parameter's value in the user's units.
     #[must_use]
-    pub fn value_out(&self, unit: model_core::effect::Unit, value: f64) -> f64 {
-        value * unit.scale(self.y, self.time, 1.0)
+    pub fn value_out(&self, unit: Unit, value: f64) -> f64 {
+        self.zero_in(unit) + value * unit.scale(self.y, self.time, 1.0)
+    }
+
+    /// A parameter's value in inner units.
+    #[must_use]
+    pub(crate) fn value_in(&self, unit: Unit, value: f64) -> f64 {
+        (value - self.zero_in(unit)) / unit.scale(self.y, self.time, 1.0)
+    }
+
+    /// What a value in this unit is if it is 0 in inner units.
+    fn zero_in(&self, unit: Unit) -> f64 {
+        if unit == Unit::Reading {
+            self.zero
+        } else {
+            0.0
+        }
     }
 
     /// Adds `by` to the offset of a model's readings.
@@ -214,10 +229,27 @@ impl Units {
             }
             return;
         }
-        let own = model.effects.iter_mut();
-        match own.into_iter().find(|e| e.name == ZERO_OFFSET.name) {
-            Some(offset) => offset.parameters.iter_mut().for_each(|level| *level += by),
-            None => model.add(ZERO_OFFSET, &[by], None),
+        let is_zero = |added: &Added| added.name == ZERO_OFFSET.name;
+        let zero = match model.effects.iter().position(is_zero) {
+            Some(zero) => {
+                let offset = &mut model.effects[zero].parameters;
+                offset.iter_mut().for_each(|level| *level += by);
+                zero
+            }
+            None => {
+                model.add(ZERO_OFFSET, &[by], None);
+                model.effects.iter().position(is_zero).unwrap_or(0)
+            }
+        };
+        // The sensor's later effects act on the reading.
+        for later in zero + 1..model.effects.len() {
+            let card = model.spec(&model.effects[later].name);
+            let parameters = card.map_or(&[][..], |card| card.parameters);
+            for (parameter, value) in parameters.iter().zip(&mut model.effects[later].parameters) {
+                if parameter.unit == Unit::Reading {
+                    *value += by;
+                }
+            }
         }
     }
 }
@@ -387,8 +419,13 @@ mod tests {
         model.add(spec("amplitude-saturation").unwrap(), &[1e-5], None);
         model.add(spec("hot-film-nonlinearity").unwrap(), &[3.0, 0.1], None);
         model.add(ZERO_OFFSET, &[12.0], None);
+        // Below the highest reading, which contains the offset.
+        model.add(spec("sensor-saturation").unwrap(), &[0.0, 45.0], None);
+        assert!(record.y.iter().any(|y| *y > 46.0));
         let units = Units::of(&model, &Preparation::of(std::slice::from_ref(&record)));
         let inner = units.model_in(&model);
+        let limit = units.value_out(Unit::Reading, inner.effects.last().unwrap().parameters[1]);
+        assert!((limit - 45.0).abs() < 1e-9);
         let run = model.free_run(&record).unwrap();
         let inside = inner.free_run(&units.record_in(&record)).unwrap();
         for (outer, inner) in run.iter().zip(&inside) {

@@ -16,6 +16,17 @@ pub enum Place {
     Sensor,
 }
 
+/// When an effect acts among those of its place.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Turn {
+    /// Before all others.
+    First,
+    /// In the order of the catalogue.
+    InOrder,
+    /// After all others, base terms included.
+    Last,
+}
+
 /// How the output depends on a parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Influence {
@@ -381,8 +392,8 @@ pub struct Spec {
     pub lag_in_series: bool,
     /// Whether the effect opposes or scales a motion; it is then applied after all driving effects.
     pub resists: bool,
-    /// Whether the effect acts before all other effects of its place.
-    pub leads: bool,
+    /// When the effect acts among those of its place.
+    pub turn: Turn,
     /// Additional card of a delay law.
     pub law: Option<LawCard>,
     /// Literature source.
@@ -408,7 +419,7 @@ impl Spec {
         base: false,
         lag_in_series: false,
         resists: false,
-        leads: false,
+        turn: Turn::InOrder,
         law: None,
         source: "",
     };

@@ -9,7 +9,7 @@ mod unit;
 
 pub use card::{
     Amplitude, Facts, Influence, LawCard, Needs, Parameter, Place, RustType, Said, Sign, Spec,
-    StartValue, Starts,
+    StartValue, Starts, Turn,
 };
 pub use unit::Unit;
 

@@ -18,6 +18,8 @@ pub enum Unit {
     Samples,
     /// The unit of y.
     Y,
+    /// A reading of the sensor in the unit of y, the offset included: it moves with the zero of the readings.
+    Reading,
     /// 1/y.
     PerY,
     /// 1/y².
@@ -35,13 +37,14 @@ pub enum Unit {
 }
 
 /// Printed symbols.
-const SYMBOLS: [(Unit, &str); 12] = [
+const SYMBOLS: [(Unit, &str); 13] = [
     (Unit::None, "-"),
     (Unit::Second, "s"),
     (Unit::Hertz, "Hz"),
     (Unit::PerSecond, "1/s"),
     (Unit::Samples, "samples"),
     (Unit::Y, "y"),
+    (Unit::Reading, "y"),
     (Unit::PerY, "1/y"),
     (Unit::PerYSquared, "1/y²"),
     (Unit::YPerSample, "y per sample"),
@@ -76,7 +79,7 @@ impl Unit {
             Self::None | Self::Samples | Self::Other(_) => 1.0,
             Self::Second => time,
             Self::Hertz | Self::PerSecond => 1.0 / time,
-            Self::Y | Self::YPerSample => y,
+            Self::Y | Self::Reading | Self::YPerSample => y,
             Self::PerY | Self::SamplesPerY => 1.0 / y,
             Self::PerYSquared => 1.0 / (y * y),
             Self::PerU => 1.0 / u,
@@ -90,7 +93,7 @@ impl Unit {
         match self {
             Self::Second if value.abs() < 1.0 => (1000.0 * value, "ms"),
             Self::None => (100.0 * value, "%"),
-            Self::Y => (value, "in y"),
+            Self::Y | Self::Reading => (value, "in y"),
             unit => (value, unit.symbol()),
         }
     }
@@ -109,7 +112,9 @@ mod tests {
     #[test]
     fn symbols_and_units_belong_together() {
         for (unit, symbol) in SYMBOLS {
-            assert_eq!(Unit::of(symbol), unit);
+            // A file does not say whether a value moves with the zero; the cards do.
+            let read = if unit == Unit::Reading { Unit::Y } else { unit };
+            assert_eq!(Unit::of(symbol), read);
             assert_eq!(unit.symbol(), symbol);
         }
         assert_eq!(Unit::of("kg"), Unit::Other("kg"));

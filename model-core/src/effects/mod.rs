@@ -256,7 +256,7 @@ pub const READING_CURVE: &Spec = &<ReadingCurve<f64> as Physics<f64>>::SPEC;
 pub const PATH_TERMS: [&Spec; 3] = [DISPERSED_DELAY, LAGGING_DRIVE, READING_CURVE];
 
 /// The base terms with a card, in their order: after all effects of their place, because a rate acts on everything that
-/// drives the flow; a term that `leads` comes first.
+/// drives the flow; unless their turn is another.
 pub const NUISANCES: [&Spec; 6] = [
     DISPERSED_DELAY,
     LAGGING_DRIVE,

@@ -5,7 +5,7 @@
 //! linear. It belongs to the base model, so that hysteresis and lags do not imitate it, and acts in front of all other
 //! effects of the sensor.
 
-use crate::effect::{Effect, Instant, Parameter, Physics, Place, Setting, Spec, Unit, take};
+use crate::effect::{Effect, Instant, Parameter, Physics, Place, Setting, Spec, Turn, Unit, take};
 use crate::real::Real;
 
 /// y = w·(tanh((s − c)/w) + tanh(c/w)): 0 at 0, slope 1 at the centre c, almost linear for a large width w.
@@ -52,7 +52,7 @@ impl<T: Real> Physics<T> for ReadingCurve<T> {
             Parameter::new("width", Unit::Y, [0.05, 10.0], &[0.4, 1.0]),
         ],
         base: true,
-        leads: true,
+        turn: Turn::First,
         source: "static curves of the separation point: Goman and Khrabrov, J. Aircraft 31 (1994); friction at reattachment: Eaton and Johnston, AIAA J. 19 (1981)",
         ..Spec::PLAIN
     };

@@ -1,7 +1,7 @@
 //! Limited range of the sensor or its amplifier.
 
 use crate::effect::{
-    Effect, Instant, Parameter, Physics, Place, Setting, Spec, StartValue, Starts, Unit, take,
+    Effect, Instant, Parameter, Physics, Place, Setting, Spec, StartValue, Starts, Turn, Unit, take,
 };
 use crate::real::Real;
 
@@ -26,11 +26,13 @@ impl<T: Real> Physics<T> for SensorSaturation<T> {
         name: "sensor-saturation",
         rust: "sensor_saturation::SensorSaturation",
         place: Place::Sensor,
+        // The converter limits what it reads: offset, drift and pickup included.
+        turn: Turn::Last,
         summary: "the reading is limited to the sensor's range",
         equation: "y = min(max(s, lo), hi)",
         parameters: &[
-            Parameter::new("lower_limit", Unit::Y, [-10.0, 10.0], &[-0.05]),
-            Parameter::new("upper_limit", Unit::Y, [-10.0, 10.0], &[0.8]),
+            Parameter::new("lower_limit", Unit::Reading, [-10.0, 10.0], &[-0.05]),
+            Parameter::new("upper_limit", Unit::Reading, [-10.0, 10.0], &[0.8]),
         ],
         starts: Starts::Rows(&[
             &[StartValue::Quantile(0.05), StartValue::Quantile(0.95)],

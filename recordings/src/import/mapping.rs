@@ -36,6 +36,10 @@ pub struct Mapping {
     /// Longest gap that is filled, s, from the value before it to the value after it; `None`: no gap is filled.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fill_gaps_s: Option<f64>,
+    /// Name of the variable at whose changes a new record begins; the name of the time: where the time starts again, and
+    /// after pauses. `None`: a file is one record.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub split_by: Option<String>,
     /// Name of the command. With `None` it is found by its usual names.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub u: Option<String>,
@@ -279,7 +283,9 @@ impl Mapping {
         record.t0 = timing.t0;
 
         let taken: Vec<&Variable> = [u, y].into_iter().chain(timing.variables).collect();
-        let taken = |v: &Variable| taken.iter().any(|t| t.name == v.name);
+        let taken = |v: &Variable| {
+            taken.iter().any(|t| t.name == v.name) || self.split_by.as_ref() == Some(&v.name)
+        };
         let chosen: Vec<&Variable> = match &self.channels {
             Some(names) => names
                 .iter()

@@ -15,6 +15,7 @@ mod npy;
 mod open;
 pub(crate) mod problem;
 mod source;
+mod split;
 mod stamp;
 mod text;
 mod timing;
@@ -22,6 +23,7 @@ mod timing;
 pub use mapping::{Mapping, near_two_levels};
 pub use problem::ImportProblem;
 pub use source::{Source, Variable};
+use split::Part;
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -55,7 +57,7 @@ pub struct Import {
     pub mapping: Mapping,
     /// Title of the data set.
     pub title: Option<String>,
-    /// Names of validation records (files without their ending).
+    /// Names of validation records: files without their ending, or records of a file that is split.
     pub validate: Vec<String>,
     /// Splits each record at this time, s: the whole becomes a validation record whose lead is the earlier samples.
     pub hold_out_from_s: Option<f64>,
@@ -189,7 +191,7 @@ pub fn files_of(paths: &[&Path]) -> Result<Vec<PathBuf>, DataError> {
     Ok(files)
 }
 
-/// Makes a data set of files, one record per file.
+/// Makes a data set of files, one record per file, or several from a file that is split.
 ///
 /// # Errors
 /// [`DataError`] naming file, line and column or variable of the first fault.
@@ -202,40 +204,48 @@ pub fn import(files: &[&Path], request: &Import) -> Result<Imported, DataError> 
         let kept = records.iter().map(Record::bytes).sum();
         let source = Source::open_beside(path, kept)?;
         let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-        let name = unused(&stem, &records);
-        let role = match request.validate.iter().any(|v| *v == stem) {
-            true => Use::Validate,
-            false => Use::Identify,
-        };
-        let mut mapped = request.mapping.record(&source, &name, role)?;
-        mapped.record.u_before = request.u_before;
-        told.push(ImportedFile {
-            name,
-            dialect: source.dialect.clone(),
-            samples: mapped.record.len(),
-            sample_period_s: mapped.record.sample_period_s,
-            mapping: mapped.mapping.clone(),
-            remarks: mapped.remarks,
-        });
-        let came_from = From {
-            file: path
-                .file_name()
-                .unwrap_or_default()
-                .to_string_lossy()
-                .into_owned(),
-            mapping: mapped.mapping,
-            units: mapped.units,
-        };
-        let parts = match request.hold_out_from_s {
-            Some(time) if role == Use::Identify => {
-                parts(mapped.record, mapped.origin, time, &records, path)?
+        let runs = request.mapping.parts(source)?;
+        let whole = runs.len() == 1;
+        for (number, Part { source, run }) in (1..).zip(runs) {
+            let own = match whole {
+                true => stem.clone().into_owned(),
+                false => format!("{stem}-{}", run.unwrap_or(number)),
+            };
+            let name = unused(&own, &records);
+            let role = match request.validate.iter().any(|v| *v == stem || *v == name) {
+                true => Use::Validate,
+                false => Use::Identify,
+            };
+            let mut mapped = request.mapping.record(&source, &name, role)?;
+            mapped.record.u_before = request.u_before;
+            told.push(ImportedFile {
+                name,
+                dialect: source.dialect.clone(),
+                samples: mapped.record.len(),
+                sample_period_s: mapped.record.sample_period_s,
+                mapping: mapped.mapping.clone(),
+                remarks: mapped.remarks,
+            });
+            let came_from = From {
+                file: path
+                    .file_name()
+                    .unwrap_or_default()
+                    .to_string_lossy()
+                    .into_owned(),
+                mapping: mapped.mapping,
+                units: mapped.units,
+            };
+            let parts = match request.hold_out_from_s {
+                Some(time) if role == Use::Identify => {
+                    parts(mapped.record, mapped.origin, time, &records, path)?
+                }
+                _ => vec![(mapped.record, mapped.origin)],
+            };
+            for (record, origin) in parts {
+                records.push(record);
+                origins.push(origin);
+                from.push(came_from.clone());
             }
-            _ => vec![(mapped.record, mapped.origin)],
-        };
-        for (record, origin) in parts {
-            records.push(record);
-            origins.push(origin);
-            from.push(came_from.clone());
         }
     }
     let mut remarks = Vec::new();

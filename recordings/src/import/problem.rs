@@ -70,7 +70,7 @@ pub enum ImportProblem {
     /// A gap that is too long to be filled.
     #[error(
         "the gap lasts {length_s} s, longer than --fill-gaps {most_s}; give --fill-gaps {length_s}, or split \
-             the file there"
+             the file there with --split-by and the name of the time"
     )]
     LongGap {
         /// Length of the gap, from the last value before it to the first value after it, s.
@@ -81,7 +81,7 @@ pub enum ImportProblem {
     /// More lost rows than can be inserted.
     #[error(
         "according to the times at least {lost} rows are missing, more than {share} % of the {rows} rows in the \
-             file; these are too many to fill. Split the file at its gaps, or, if only the times are wrong, give \
+             file; these are too many to fill. Split the file at its gaps with --split-by and the name of the time, or, if only the times are wrong, give \
              --period SECONDS --ignore-time"
     )]
     ManyLost {

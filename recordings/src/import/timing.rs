@@ -24,6 +24,25 @@ pub(super) struct Timing<'a> {
     pub(super) rows: Vec<usize>,
 }
 
+/// The times of a file's rows as printed.
+pub(super) struct Times<'a> {
+    time: &'a Variable,
+    /// The dates of a time that is a clock time.
+    date: Option<&'a Variable>,
+    pub(super) printed: PrintedTimes,
+    /// Seconds per unit, if not 1.
+    scale: Option<f64>,
+    remarks: Vec<String>,
+}
+
+impl Times<'_> {
+    /// Whether the variable is the time, or the dates of it.
+    pub(super) fn is_from(&self, variable: &Variable) -> bool {
+        let names = [Some(self.time), self.date];
+        names.into_iter().flatten().any(|v| v.name == variable.name)
+    }
+}
+
 /// Conversion of a time's numbers to seconds.
 struct Scale {
     seconds: f64,
@@ -49,7 +68,7 @@ impl Mapping {
             period_s,
             by: "--period is",
         });
-        let Some(time) = self.time(source, n, &file)? else {
+        let Some(times) = self.times(source, n, place)? else {
             let period_s = match self.period_s.or_else(|| stated_period(source)) {
                 Some(period_s) => period_s,
                 None => {
@@ -67,59 +86,16 @@ impl Mapping {
             });
         };
         found.period_s = None;
-        let (time, date) = with_date(source, time, n);
-        found.t = Some(time.name.clone());
-        crate::import::mapping::same_length(time, n, place)?;
-        crate::import::mapping::finite(time, place)?;
-        let (times, t0) = match &time.stamped {
-            Some(stamped) => {
-                let seconds = match date.and_then(|d| d.stamped.as_ref()) {
-                    Some(date) => {
-                        let start = stamped.of_day.first().copied().unwrap_or(0.0);
-                        let pairs = date.seconds.iter().zip(&stamped.of_day);
-                        pairs.map(|(day, now)| day + now - start).collect()
-                    }
-                    None => stamped.seconds.clone(),
-                };
-                let day = date.and_then(|d| d.stamped.as_ref());
-                let day = day.map_or(String::new(), |day| format!("{} ", day.first));
-                remarks.push(counted_from(&format!("{day}{}", stamped.first)));
-                if date.is_none() && stamped.midnights > 0 {
-                    remarks.push(format!(
-                        "the clock passes midnight {} time(s)",
-                        stamped.midnights
-                    ));
-                }
-                let unit = stamped.unit.clone();
-                (
-                    PrintedTimes {
-                        time: seconds,
-                        unit,
-                    },
-                    0.0,
-                )
-            }
-            None => {
-                let scale = self.scale(time, &file)?;
-                if scale.seconds != 1.0 {
-                    found.t_scale = Some(scale.seconds);
-                }
-                let first = time.values.first().copied().unwrap_or(0.0);
-                let start = match first.abs() * scale.seconds >= SINCE_1970 {
-                    true => first,
-                    false => 0.0,
-                };
-                if let Some(unit) = scale.epoch {
-                    remarks.push(format!("`{}` is read as a Unix time in {unit}", time.name));
-                }
-                if start != 0.0 {
-                    remarks.push(counted_from(&start.to_string()));
-                }
-                let times = scaled(time, start, scale.seconds);
-                let t0 = times.time.first().copied().unwrap_or(0.0);
-                (times, t0)
-            }
-        };
+        found.t = Some(times.time.name.clone());
+        found.t_scale = times.scale.or(found.t_scale);
+        remarks.extend(times.remarks);
+        let Times {
+            time,
+            date,
+            printed: times,
+            ..
+        } = times;
+        let t0 = times.time.first().copied().unwrap_or(0.0);
         let fault = |f: TimeFault| place(time, f.row).error(f.problem);
         let filled = match self.fill_gaps_s {
             Some(most_s) => completed(&times, stated, most_s).map_err(fault)?,
@@ -148,6 +124,75 @@ impl Mapping {
             period_s: clock.period_s,
             rows,
         })
+    }
+
+    /// The times as the file prints them, in seconds; `None` if the file has none or they are ignored.
+    ///
+    /// # Errors
+    /// [`DataError`] naming the cell, or the missing column.
+    pub(super) fn times<'a>(
+        &self,
+        source: &'a Source,
+        n: usize,
+        place: &dyn Fn(&Variable, usize) -> FilePlace,
+    ) -> Result<Option<Times<'a>>, DataError> {
+        let file = FilePlace::file(source.path());
+        let Some(time) = self.time(source, n, &file)? else {
+            return Ok(None);
+        };
+        let (time, date) = with_date(source, time, n);
+        crate::import::mapping::same_length(time, n, place)?;
+        crate::import::mapping::finite(time, place)?;
+        let mut remarks = Vec::new();
+        let mut used = None;
+        let printed = match &time.stamped {
+            Some(stamped) => {
+                let day = date.and_then(|d| d.stamped.as_ref());
+                let seconds = match day {
+                    Some(date) => {
+                        let start = stamped.of_day.first().copied().unwrap_or(0.0);
+                        let pairs = date.seconds.iter().zip(&stamped.of_day);
+                        pairs.map(|(day, now)| day + now - start).collect()
+                    }
+                    None => stamped.seconds.clone(),
+                };
+                let day = day.map_or(String::new(), |day| format!("{} ", day.first));
+                remarks.push(counted_from(&format!("{day}{}", stamped.first)));
+                if date.is_none() && stamped.midnights > 0 {
+                    remarks.push(format!(
+                        "the clock passes midnight {} time(s)",
+                        stamped.midnights
+                    ));
+                }
+                PrintedTimes {
+                    time: seconds,
+                    unit: stamped.unit.clone(),
+                }
+            }
+            None => {
+                let scale = self.scale(time, &file)?;
+                used = Some(scale.seconds).filter(|seconds| *seconds != 1.0);
+                let first = time.values.first().copied().unwrap_or(0.0);
+                let start = match first.abs() * scale.seconds >= SINCE_1970 {
+                    true => first,
+                    false => 0.0,
+                };
+                if let Some(unit) = scale.epoch {
+                    remarks.push(format!("`{}` is read as a Unix time in {unit}", time.name));
+                }
+                if start != 0.0 {
+                    remarks.push(counted_from(&start.to_string()));
+                }
+                scaled(time, start, scale.seconds)
+            }
+        };
+        Ok(Some(Times {
+            time,
+            date,
+            printed,
+            scale: used,
+            remarks,
+        }))
     }
 
     /// The time variable; `None` if the file has none or it is ignored.

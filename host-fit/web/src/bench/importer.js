@@ -30,8 +30,8 @@ function upload(files) {
   });
 }
 
-/** A choice of a variable, or of none: it is then found by its name. @param {string} name @param {string} label */
-function choice(name, label) {
+/** A choice of a variable, or of `none`. @param {string} name @param {string} label */
+function choice(name, label, none = "by its name") {
   /** @type {Map<string, string>} */
   const variables = new Map();
   for (const file of taken) {
@@ -40,7 +40,7 @@ function choice(name, label) {
     }
   }
   const before = /** @type {HTMLSelectElement | null} */ (document.querySelector(`#mapping [name="${name}"]`))?.value;
-  const select = /** @type {HTMLSelectElement} */ (el("select", { name }, el("option", { value: "" }, "by its name"),
+  const select = /** @type {HTMLSelectElement} */ (el("select", { name }, el("option", { value: "" }, none),
     ...[...variables].map(([value, text]) => el("option", { value }, text))));
   select.value = before ?? "";
   return el("label", {}, label, select);
@@ -64,6 +64,7 @@ function draw() {
   }
   const form = el("form", { id: "mapping", class: "fields", onsubmit: submit },
     choice("t", "time"), choice("u", "command u"), choice("y", "output y"),
+    choice("split-by", "new record where this changes", "one record per file"),
     number("u-threshold", "u is on above"), number("y-scale", "factor of y"), number("y-offset", "added to y"),
     number("period", "period (s), if no time"), number("fill-gaps", "fill gaps up to (s)"), number("hold-out-from", "validation from (s)"),
     el("label", {}, "title", el("input", { type: "text", name: "title" })),

@@ -159,6 +159,7 @@ fn pages() -> Result<Vec<(String, String)>> {
         "slow-wake",
         "level-rate",
         "reading-curve",
+        "sensor-resonance",
         "zero-offset",
         "constant-delay",
         "saturating-delay",

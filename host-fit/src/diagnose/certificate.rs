@@ -41,7 +41,7 @@ impl Certificate {
 
     /// Upper bound of the p-value: the inverse of the e-value (Markov's inequality).
     #[must_use]
-    pub(super) fn p_value(&self) -> f64 {
+    pub fn p_value(&self) -> f64 {
         p_of(self.log_e)
     }
 

@@ -181,15 +181,15 @@ impl Session<'_> {
             &found.best
         };
         let certificates = self.certificates(subject, &sets, &others, &found);
-        let nats = |spec: &&'static Spec| Some(certificates.get(spec.name)?.evidence_nats);
-        let evidence: Vec<Option<f64>> = order.iter().take(way.proven).map(nats).collect();
+        // The first effect without a certificate and all after it are surrogates.
+        let holds = |spec: &&&'static Spec| {
+            let own = certificates.get(spec.name);
+            own.is_none_or(Certificate::holds)
+        };
+        let evident = order.iter().take(way.proven).take_while(holds).count();
         let is_known = |spec: &&&'static Spec| is_identified(&parameters[spec.name], spec);
         let known = order.iter().take_while(is_known).count();
-        let proven = if claims {
-            evident(&evidence).min(known)
-        } else {
-            0
-        };
+        let proven = if claims { evident.min(known) } else { 0 };
         let (verdict, claims) = match claims && proven == 0 {
             true => (Verdict::PartlyExplained, false),
             false => (verdict, claims),
@@ -350,14 +350,6 @@ impl Session<'_> {
     }
 }
 
-/// Number of named effects, counted from the most important one. `evidence` of an effect is that of the model minus
-/// that of the best model without the effect, nats; `None` if it cannot be computed. The first effect with negative
-/// evidence and all after it are surrogates.
-fn evident(evidence: &[Option<f64>]) -> usize {
-    let has = |nats: &&Option<f64>| nats.is_none_or(|nats| nats >= 0.0);
-    evidence.iter().take_while(has).count()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -365,14 +357,6 @@ mod tests {
     use crate::terms::Bench;
     use model_core::effects::spec;
     use std::sync::atomic::AtomicBool;
-
-    #[test]
-    fn an_effect_without_evidence_takes_no_name_but_its_own() {
-        assert_eq!(evident(&[Some(3829.0), Some(-118.0)]), 1);
-        assert_eq!(evident(&[Some(-1.0), Some(50.0)]), 0);
-        assert_eq!(evident(&[Some(0.0), None]), 2);
-        assert_eq!(evident(&[]), 0);
-    }
 
     /// A drift is hidden. A vortex in the same model has an amplitude whose interval contains 0. The uncertainty
     /// must be attributed to the vortex.

@@ -349,17 +349,27 @@ pub struct TargetVerdict {
 fn level_within([low, high]: [f64; 2], share: f64) -> f64 {
     let decimals = (1.0 - (high - low).log10().floor()).clamp(0.0, 9.0) as usize;
     let exact = low + share * (high - low);
-    format!("{exact:.decimals$}").parse().unwrap_or(exact)
+    // The sum with 0 is not −0.
+    format!("{exact:.decimals$}").parse().unwrap_or(exact) + 0.0
 }
 
-/// The command that follows a finished model: a law that holds the middle of the reachable interval, or the export of
+/// The command that follows a finished model: a law that holds the middle of the reachable levels of the records, or the export of
 /// the model if no law can be designed from it.
 pub(super) fn command_after(model: &Model) -> String {
     let units = units_of_order_one(model);
     match held(&units.model_in(model)) {
         Ok(held) => {
             let ends = [held.reachable.low, held.reachable.high];
-            let target = level_within(ends.map(|y| y * units.y + units.zero), 0.5);
+            let [low, high] = ends.map(|y| y * units.y + units.zero);
+            // A model may reach levels that no record contains.
+            let [least, most] = model.training.y_range;
+            let [least, most] = [low.max(least), high.min(most)];
+            let ends = if least < most {
+                [least, most]
+            } else {
+                [low, high]
+            };
+            let target = level_within(ends, 0.5);
             format!("host-fit design model.toml DATASET --target {target} -o controlled.toml")
         }
         Err(_) => "host-fit codegen model.toml --lang python -o identified.py".into(),

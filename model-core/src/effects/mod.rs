@@ -26,6 +26,7 @@ pub mod quadratic_drag;
 pub mod reading_curve;
 pub mod rectifying_sensor;
 pub mod saturating_delay;
+pub mod sensor_resonance;
 pub mod sensor_saturation;
 pub mod slow_wake;
 pub mod starting_vortex;
@@ -221,6 +222,7 @@ catalogue! {
     slow_wake::SlowWake: SlowWake<T>,
     level_rate::LevelRate: LevelRate<T>,
     reading_curve::ReadingCurve: ReadingCurve<T>,
+    sensor_resonance::SensorResonance: SensorResonance<T>,
     vortex_shedding::VortexShedding: VortexShedding<T>,
     rectifying_sensor::RectifyingSensor: RectifyingSensor,
     hot_film_nonlinearity::HotFilmNonlinearity: HotFilmNonlinearity<T>,
@@ -252,17 +254,26 @@ pub const LAGGING_DRIVE: &Spec = &<LaggingDrive<f64> as Physics<f64>>::SPEC;
 /// The card of a monotone curve between the flow and its reading, a base term.
 pub const READING_CURVE: &Spec = &<ReadingCurve<f64> as Physics<f64>>::SPEC;
 
+/// The card of a sensor that swings, a base term.
+pub const SENSOR_RESONANCE: &Spec = &<SensorResonance<f64> as Physics<f64>>::SPEC;
+
 /// Base terms between command, flow and reading: a search tries each from all starting values of its card.
-pub const PATH_TERMS: [&Spec; 3] = [DISPERSED_DELAY, LAGGING_DRIVE, READING_CURVE];
+pub const PATH_TERMS: [&Spec; 4] = [
+    DISPERSED_DELAY,
+    LAGGING_DRIVE,
+    READING_CURVE,
+    SENSOR_RESONANCE,
+];
 
 /// The base terms with a card, in their order: after all effects of their place, because a rate acts on everything that
 /// drives the flow; unless their turn is another.
-pub const NUISANCES: [&Spec; 6] = [
+pub const NUISANCES: [&Spec; 7] = [
     DISPERSED_DELAY,
     LAGGING_DRIVE,
     SLOW_WAKE,
     LEVEL_RATE,
     READING_CURVE,
+    SENSOR_RESONANCE,
     ZERO_OFFSET,
 ];
 
@@ -369,6 +380,7 @@ mod tests {
                 "slow-wake",
                 "level-rate",
                 "reading-curve",
+                "sensor-resonance",
                 "zero-offset",
                 "constant-delay",
                 "saturating-delay"

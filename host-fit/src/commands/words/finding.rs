@@ -165,7 +165,7 @@ fn outcome_alone(r: &Ranked, diagnosis: &Diagnosis, plant: Plant) -> String {
     if diagnosis.missing.contains(&r.effect) {
         let others = diagnosis.missing.iter().filter(|name| **name != r.effect);
         let others: Vec<String> = others.map(|name| effect_in_words(name, plant)).collect();
-        return match r.refitted && r.p_value > RULES.level && !others.is_empty() {
+        return match is_named_beside(r, diagnosis) {
             true => format!("named beside {}", others.join(" and ")),
             false => "named".to_owned(),
         };
@@ -195,6 +195,12 @@ fn outcome_alone(r: &Ranked, diagnosis: &Diagnosis, plant: Plant) -> String {
         [_] => "imitates the named behaviour".to_owned(),
         _ => "imitates the named behaviours".to_owned(),
     }
+}
+
+/// Whether an effect is named although alone it is not significant.
+fn is_named_beside(r: &Ranked, diagnosis: &Diagnosis) -> bool {
+    let named = &diagnosis.missing;
+    named.len() > 1 && named.contains(&r.effect) && r.refitted && r.p_value > RULES.level
 }
 
 /// Whether a candidate was fitted, or is part of the answer.
@@ -250,19 +256,38 @@ fn candidate_row(r: &Ranked, diagnosis: &Diagnosis, plant: Plant) -> Vec<String>
         .filter(|_| telling)
         .map(|(name, p)| estimate_words(name, p))
         .collect();
+    // What an effect adds to the others is a matter of the model with all of them.
+    let beside = diagnosis.certificates.get(&r.effect);
+    let (falls, nats, p_value) = match beside.filter(|_| is_named_beside(r, diagnosis)) {
+        Some(own) => (
+            falls_at_its_step(r, diagnosis),
+            Some(own.evidence_nats),
+            Some(own.p_value()),
+        ),
+        None => (
+            r.error_reduction_percent,
+            r.gain_nats,
+            r.refitted.then_some(r.p_value),
+        ),
+    };
+    let none = || "–".to_owned();
     vec![
         effect_in_words(&r.effect, plant),
         outcome(r, diagnosis, plant),
-        percent(r.error_reduction_percent),
-        r.gain_nats
-            .map_or_else(|| "–".to_owned(), |nats| whole(nats.round())),
-        if r.refitted {
-            p_bound(r.p_value)
-        } else {
-            "–".to_owned()
-        },
+        percent(falls),
+        nats.map_or_else(none, |nats| whole(nats.round())),
+        p_value.map_or_else(none, p_bound),
         parameters.join(", "),
     ]
+}
+
+/// By how much the error falls at the step of the ladder that adds the effect, %.
+fn falls_at_its_step(r: &Ranked, diagnosis: &Diagnosis) -> f64 {
+    let steps = diagnosis.ladder.windows(2);
+    let mut own = steps.filter(|pair| pair[1].effects.last() == Some(&r.effect));
+    own.next().map_or(r.error_reduction_percent, |pair| {
+        100.0 * (1.0 - pair[1].validate_rmse / pair[0].validate_rmse)
+    })
 }
 
 /// The ranking with the named effects first, then the surrogates, then the others, each in their order.
@@ -282,7 +307,7 @@ pub(crate) fn named_first(diagnosis: &Diagnosis) -> Vec<&Ranked> {
 
 fn ranking_table(rows: &[Vec<String>]) -> String {
     let head = [
-        "each candidate alone",
+        "each candidate",
         "outcome",
         "error falls",
         "nats",

@@ -109,19 +109,7 @@ pub fn base_model(
     let mut refused = None;
     for law in laws {
         progress("the model with the fewest lags");
-        let mut root = search.root(&with_law(law), mid_run);
-        // Lags that are chosen with the wrong averaging time imitate the right one, so the shortest is tried at once. The
-        // time is a parameter and must lower the error like every other parameter.
-        if law.follows_y()
-            && laws.len() > 1
-            && let Ok(present) = search.root(&with_average(&given, law, AVERAGES[0]), mid_run)
-        {
-            let least = present.judged.size() + RULES.price;
-            if !root.as_ref().is_ok_and(|root| root.judged.size() <= least) {
-                root = Ok(present);
-            }
-        }
-        match root {
+        match search.root(&with_law(law), mid_run) {
             Ok(root) => roots.push(root),
             Err(error) => refused = Some(error),
         }

@@ -59,9 +59,10 @@ impl<T: Real> Physics<T> for SensorResonance<T> {
                 "frequency",
                 Unit::Hertz,
                 [1.0, 200.0],
-                &[4.0, 9.0, 18.0, 40.0],
+                &[3.0, 5.0, 8.0, 12.0, 18.0, 27.0, 40.0, 60.0],
             ),
-            Parameter::new("damping_ratio", Unit::None, [0.005, 0.9], &[0.05, 0.4]),
+            // A larger damping ratio would imitate a memory of the flow.
+            Parameter::new("damping_ratio", Unit::None, [0.005, 0.2], &[0.1]),
         ],
         base: true,
         source: "dynamic response of force balances: Tropea, Yarin and Foss, Handbook of Experimental Fluid Mechanics (2007), ch. 8",

@@ -331,6 +331,9 @@ fn on_samples_unless_it_costs(judge: &Judge, judged: Judged) -> Judged {
 mod tests {
     use super::*;
     use crate::data::Use;
+    use model_core::effects::SENSOR_RESONANCE;
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
 
     #[test]
     fn a_model_that_diverges_gives_way_to_the_next_one() {
@@ -348,5 +351,62 @@ mod tests {
         assert_eq!(chosen(0.9, &[0.5]), 0.9);
         assert_eq!(chosen(1.05, &[1.02, 0.5, 0.6]), 0.5);
         assert_eq!(chosen(1.05, &[1.02]), 1.05);
+    }
+
+    /// A flow of first order behind a dead time, read by a balance that swings at 23 Hz: neither long lags nor an effect
+    /// stand for the swing.
+    #[test]
+    fn a_balance_that_swings_is_part_of_the_sensor() {
+        const STEPS: usize = 20;
+        let (frequency, damping) = (23.0, 0.03);
+        let record = |seed: u64, role: Use| {
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            let (mut left, mut on) = (100, false);
+            let command = (0..5000).map(|_| {
+                left -= 1;
+                if left == 0 {
+                    (left, on) = (rng.random_range(40..400), !on);
+                }
+                f64::from(u8::from(on))
+            });
+            let u: Vec<f64> = command.collect();
+            let omega = std::f64::consts::TAU * frequency;
+            let step = 1e-3 / STEPS as f64;
+            let (mut flow, mut shown, mut speed) = (0.0, 0.0, 0.0);
+            let response = (0..u.len()).map(|k| {
+                let read = shown + 0.02 * (rng.random::<f64>() - 0.5);
+                let jet = k.checked_sub(25).map_or(0.0, |k| u[k]);
+                for _ in 0..STEPS {
+                    flow += step * (0.8 * jet - flow) / 0.04;
+                    speed +=
+                        step * (omega * omega * (flow - shown) - 2.0 * damping * omega * speed);
+                    shown += step * speed;
+                }
+                read
+            });
+            let y = response.collect();
+            Record::new("balance", role, 0.001, u, y)
+        };
+        let records = [
+            record(1, Use::Identify),
+            record(2, Use::Identify),
+            record(3, Use::Validate),
+        ];
+        let how = Frame {
+            laws: &[Model::default().delay],
+            interpolated: true,
+            settings: Settings::default(),
+        };
+        let never = AtomicBool::new(false);
+        let found = base_model(&records, &how, &never, &|_| {}, &());
+        let model = found.expect("data").expect("stable").model;
+        let mut effects = model.effects.iter();
+        let swing = effects.find(|added| added.name == SENSOR_RESONANCE.name);
+        let [hz, share] = swing.expect("the swing").parameters[..] else {
+            panic!("{model:?}");
+        };
+        assert!((hz / frequency - 1.0).abs() < 0.01, "{hz}");
+        assert!((share / damping - 1.0).abs() < 0.1, "{share}");
+        assert!(model.state_lags.len() <= 2, "{:?}", model.state_lags);
     }
 }

@@ -203,7 +203,7 @@ fn faults_name_the_variable_and_the_remedy() {
             Mapping::default(),
             vec![
                 "which variable is the command u",
-                "--u NAME",
+                "--u \"data(:,2)\" --u-threshold 2.49",
                 "`data(:,1)` (40)",
                 "`Ts` = 0.001",
             ],

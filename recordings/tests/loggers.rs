@@ -436,6 +436,22 @@ fn short_gaps_are_filled_and_long_ones_named() {
     }
 }
 
+#[test]
+fn a_column_with_two_levels_may_be_the_command() {
+    let rows = "t,U_ac,F_z\n0,0,4.1\n0.1,8.5,4.2\n0.2,8.5,4.4\n0.3,0,4.3\n";
+    refused(
+        rows,
+        &[
+            "`U_ac`, which takes the values 0 and 8.5 only",
+            "--u \"U_ac\" --u-threshold 4.25",
+        ],
+    );
+    refused(
+        "t,a,b\n0,0,0\n0.1,2,3\n0.2,2,3\n",
+        &["name it with --u NAME"],
+    );
+}
+
 /// Two runs of three rows, and a pause of the logger within the second.
 #[test]
 fn a_file_with_several_runs_becomes_several_records() {

@@ -8,11 +8,11 @@ use serde::{Deserialize, Serialize};
 use super::gaps::{Filling, Gaps};
 use super::names::{
     COMMANDS, CONTROLLER_OUTPUTS, OUTPUTS, PROCESS_VALUES, TIMES, find, is_in_percent, known_as,
-    only_other, only_switch,
+    only_other, only_switch, only_two_levels,
 };
 use super::problem::ImportProblem;
 use super::source::{Source, Variable};
-use crate::error::{DataError, DataProblem, FilePlace};
+use crate::error::{DataError, DataProblem, FilePlace, printable};
 use crate::folder::mapping_of;
 use crate::record::{Origin, RESERVED, Record, Use};
 
@@ -124,7 +124,19 @@ impl Mapping {
             Some(u) => (u, false),
             None => match only_switch(source, &taken) {
                 Some(u) => (u, true),
-                None => return Err(which("the command u", "u")),
+                None => {
+                    let two = only_two_levels(source, &taken);
+                    let levels = two.map(|(switch, [low, high])| ImportProblem::TwoLevels {
+                        name: printable(&switch.name),
+                        low,
+                        high,
+                        middle: brief((low + high) / 2.0, 2),
+                    });
+                    return Err(levels.map_or_else(
+                        || which("the command u", "u"),
+                        |problem| file.clone().error(problem.into()),
+                    ));
+                }
             },
         };
         if by_value {

@@ -118,6 +118,22 @@ pub(super) fn only_switch<'a>(source: &'a Source, taken: &[&Variable]) -> Option
     only(source, taken, is_switch)
 }
 
+/// The only variable not in `taken` that takes two values, and these values in ascending order.
+pub(super) fn only_two_levels<'a>(
+    source: &'a Source,
+    taken: &[&Variable],
+) -> Option<(&'a Variable, [f64; 2])> {
+    let levels = |v: &Variable| {
+        let mut present = v.values.iter().copied().filter(|value| !value.is_nan());
+        let first = present.next()?;
+        let other = present.find(|value| *value != first)?;
+        let two = present.all(|value| value == first || value == other);
+        two.then_some([first.min(other), first.max(other)])
+    };
+    let found = only(source, taken, |v| levels(v).is_some())?;
+    Some((found, levels(found)?))
+}
+
 /// The output without a usual name: the only numeric variable not in `taken`.
 pub(super) fn only_other<'a>(source: &'a Source, taken: &[&Variable]) -> Option<&'a Variable> {
     only(source, taken, |_| true)

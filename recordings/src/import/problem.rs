@@ -118,6 +118,20 @@ pub enum ImportProblem {
         /// The names found.
         found: String,
     },
+    /// No usual name identifies the command, but one variable takes two values.
+    #[error(
+        "it is not clear which variable is the command u; if it is `{name}`, which takes the values {low} and {high} only, give --u \"{name}\" --u-threshold {middle}"
+    )]
+    TwoLevels {
+        /// The variable.
+        name: String,
+        /// Its lower value.
+        low: f64,
+        /// Its higher value.
+        high: f64,
+        /// The middle of both.
+        middle: f64,
+    },
     /// Neither a time column nor a sampling period.
     #[error(
         "has no time variable; name it with --t NAME, or give the sampling period with --period SECONDS; the \

@@ -7,9 +7,7 @@ use super::names::find;
 use super::source::{Exactness, Source, Variable};
 use crate::error::{DataError, FilePlace};
 use crate::sampling::PrintedTimes;
-
-/// A step of time longer than this many median steps begins a new record.
-const PAUSE: f64 = 1.5;
+use crate::thresholds::RULES;
 
 /// A part of a file, and the number of its run if a column has it.
 pub(super) struct Part {
@@ -72,7 +70,7 @@ fn starts_of(times: &PrintedTimes) -> Vec<usize> {
     let median = *sorted.select_nth_unstable_by(middle, f64::total_cmp).1;
     let is_start = |k: &usize| {
         let rounding = unit[*k].max(unit[k - 1]);
-        step(*k) < 0.0 || step(*k) > PAUSE * median + rounding
+        step(*k) < 0.0 || step(*k) > (1.0 + RULES.most_uneven) * median + rounding
     };
     (1..time.len()).filter(is_start).collect()
 }

@@ -131,6 +131,7 @@ impl Mapping {
                         low,
                         high,
                         middle: brief((low + high) / 2.0, 2),
+                        found: source.listed(),
                     });
                     return Err(levels.map_or_else(
                         || which("the command u", "u"),

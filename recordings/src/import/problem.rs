@@ -120,7 +120,7 @@ pub enum ImportProblem {
     },
     /// No usual name identifies the command, but one variable takes two values.
     #[error(
-        "it is not clear which variable is the command u; if it is `{name}`, which takes the values {low} and {high} only, give --u \"{name}\" --u-threshold {middle}"
+        "it is not clear which variable is the command u; if it is `{name}`, which takes the values {low} and {high} only, give --u \"{name}\" --u-threshold {middle}; otherwise name it with --u NAME; the file has {found}"
     )]
     TwoLevels {
         /// The variable.
@@ -131,6 +131,8 @@ pub enum ImportProblem {
         high: f64,
         /// The middle of both.
         middle: f64,
+        /// The names found.
+        found: String,
     },
     /// Neither a time column nor a sampling period.
     #[error(

@@ -223,18 +223,47 @@ pub fn base_model(
     }))
 }
 
-/// `best` if its free run over the records does not diverge; otherwise the first of the `others` whose free run does
-/// not. `best` if all diverge. Close to an instability, rounding in other units may decide whether a run diverges.
+/// `best` if its free run does not diverge, neither over the records nor if the shortest of them is followed by as long a
+/// time with the input off, or fully on; otherwise the first of the `others` of which this holds. `best` if all diverge.
+/// Close to an instability, rounding in other units may decide whether a run diverges.
 fn stable_one(best: Model, others: impl Iterator<Item = Model>, records: &[Record]) -> Model {
+    let shortest = records.iter().min_by_key(|record| record.len());
     let is_stable = |model: &Model| {
-        let runs = parallel::all(records, |record| model.free_run(record).ok());
-        runs.is_some()
+        let ends = [model.command.off, model.command.full];
+        let longer = shortest.map(|record| ends.map(|u| followed_by(record, u)));
+        let all: Vec<&Record> = records.iter().chain(longer.iter().flatten()).collect();
+        parallel::all(&all, |record| model.free_run(record).ok()).is_some()
     };
     if is_stable(&best) {
         return best;
     }
     let mut others = others;
     others.find(is_stable).unwrap_or(best)
+}
+
+/// A record that is followed by as many samples with the constant command `u`; everything measured stays as at its end,
+/// and what a run follows at the start stays what it is.
+fn followed_by(record: &Record, u: f64) -> Record {
+    let n = 2 * record.len();
+    let hold = |series: &mut Vec<f64>| {
+        if let Some(&last) = series.last() {
+            series.resize(n, last);
+        }
+    };
+    let mut longer = record.clone();
+    longer.u.resize(n, u);
+    let Record {
+        y,
+        y_sd,
+        y_min,
+        y_max,
+        channels,
+        ..
+    } = &mut longer;
+    hold(y);
+    [y_sd, y_min, y_max].into_iter().flatten().for_each(hold);
+    channels.values_mut().for_each(hold);
+    longer
 }
 
 /// The best first- or second-order model among the fitted structures, if its score is close to that of the best
@@ -349,6 +378,8 @@ mod tests {
             stable_one(with_pole(best), others, std::slice::from_ref(&record)).a[0]
         };
         assert_eq!(chosen(0.9, &[0.5]), 0.9);
+        // It does not diverge within the record, but soon after.
+        assert_eq!(chosen(1.001, &[0.5]), 0.5);
         assert_eq!(chosen(1.05, &[1.02, 0.5, 0.6]), 0.5);
         assert_eq!(chosen(1.05, &[1.02]), 1.05);
     }

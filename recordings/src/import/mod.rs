@@ -204,19 +204,27 @@ pub fn import(files: &[&Path], request: &Import) -> Result<Imported, DataError> 
         let kept = records.iter().map(Record::bytes).sum();
         let source = Source::open_beside(path, kept)?;
         let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-        let runs = request.mapping.parts(source)?;
-        let whole = runs.len() == 1;
-        for (number, Part { source, run }) in (1..).zip(runs) {
-            let own = match whole {
-                true => stem.clone().into_owned(),
-                false => format!("{stem}-{}", run.unwrap_or(number)),
+        let runs = request.mapping.parts(&source)?;
+        let rows = runs.last().map_or(0, |last| last.rows.end);
+        // A file that is not split is one record of its name.
+        let several = runs.len() > 1;
+        let runs: Vec<Option<Part>> = match several {
+            true => runs.into_iter().map(Some).collect(),
+            false => vec![None],
+        };
+        for (number, run) in (1..).zip(&runs) {
+            let own = match run {
+                None => stem.clone().into_owned(),
+                Some(part) => format!("{stem}-{}", part.run.unwrap_or(number)),
             };
+            let part = run.as_ref().map(|part| source.part(&part.rows, rows));
+            let source = part.as_ref().unwrap_or(&source);
             let name = unused(&own, &records);
             let role = match request.validate.iter().any(|v| *v == stem || *v == name) {
                 true => Use::Validate,
                 false => Use::Identify,
             };
-            let mut mapped = request.mapping.record(&source, &name, role)?;
+            let mut mapped = request.mapping.record(source, &name, role)?;
             mapped.record.u_before = request.u_before;
             told.push(ImportedFile {
                 name,

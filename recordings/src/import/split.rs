@@ -5,28 +5,29 @@ use std::ops::Range;
 use super::mapping::Mapping;
 use super::names::find;
 use super::source::{Exactness, Source, Variable};
+use super::stamp::Stamped;
 use crate::error::{DataError, FilePlace};
 use crate::sampling::PrintedTimes;
 use crate::thresholds::RULES;
 
-/// A part of a file, and the number of its run if a column has it.
+/// The rows of a record in its file, and the number of its run if a column has it.
 pub(super) struct Part {
-    pub(super) source: Source,
+    pub(super) rows: Range<usize>,
     pub(super) run: Option<u64>,
 }
 
 impl Mapping {
-    /// The records of a file: one, or those that begin where the variable `split_by` changes. If that is the time, a
-    /// record begins where the time starts again and after a pause.
+    /// The records of a file, which begin where the variable `split_by` changes; none without that variable. If it is the
+    /// time, a record begins where the time starts again and after a pause.
     ///
     /// # Errors
     /// [`DataError`] if the file has no such variable.
-    pub(super) fn parts(&self, source: Source) -> Result<Vec<Part>, DataError> {
+    pub(super) fn parts(&self, source: &Source) -> Result<Vec<Part>, DataError> {
         let Some(by) = &self.split_by else {
-            return Ok(vec![Part { source, run: None }]);
+            return Ok(Vec::new());
         };
         let file = FilePlace::file(source.path());
-        let variable = find(&source, by, &file)?;
+        let variable = find(source, by, &file)?;
         let n = variable.values.len();
         let place = |variable: &Variable, row: usize| {
             let here = file.clone().in_column(&variable.name);
@@ -35,7 +36,7 @@ impl Mapping {
                 None => here,
             }
         };
-        let time = self.times(&source, n, &place)?;
+        let time = self.times(source, n, &place)?;
         let time = time.filter(|time| time.is_from(variable));
         let mut runs = None;
         let begins = match time {
@@ -51,7 +52,7 @@ impl Mapping {
         let ends = begins.iter().copied().chain([n]);
         let starts = std::iter::once(0).chain(begins.iter().copied());
         let part = |(from, to): (usize, usize)| Part {
-            source: source.part(from..to, n),
+            rows: from..to,
             run: runs.as_ref().map(|runs| runs[from] as u64),
         };
         Ok(starts.zip(ends).map(part).collect())
@@ -76,42 +77,65 @@ fn starts_of(times: &PrintedTimes) -> Vec<usize> {
 }
 
 impl Source {
-    /// The file with only these of its `n` rows; variables of another length stay whole.
-    fn part(&self, rows: Range<usize>, n: usize) -> Self {
-        let mut part = self.clone();
+    /// The file with only these of the `n` rows that it is split by; variables of another length stay whole.
+    pub(super) fn part(&self, rows: &Range<usize>, n: usize) -> Self {
+        let own = |variable: &Variable| match variable.values.len() == n {
+            true => variable.part(rows),
+            false => variable.clone(),
+        };
+        let mut part = Self {
+            path: self.path.clone(),
+            variables: self.variables.iter().map(own).collect(),
+            skipped: self.skipped.clone(),
+            unread: self.unread.clone(),
+            remarks: self.remarks.clone(),
+            lines: Vec::new(),
+            dialect: self.dialect.clone(),
+        };
         for variable in &mut part.variables {
-            if variable.values.len() == n {
-                variable.keep(&rows);
-            }
             if let (Some(stamped), Some(line)) = (&mut variable.stamped, self.lines.get(rows.start))
                 && rows.start > 0
             {
                 stamped.first = format!("line {line}");
             }
         }
-        if part.lines.len() == n {
-            part.lines = self.lines[rows].to_vec();
+        if self.lines.len() == n {
+            part.lines = self.lines[rows.clone()].to_vec();
         }
         part
     }
 }
 
 impl Variable {
-    fn keep(&mut self, rows: &Range<usize>) {
-        self.values = self.values[rows.clone()].to_vec();
-        if let Exactness::Printed(units) = &mut self.exactness {
-            *units = units.get(rows.clone()).unwrap_or_default().to_vec();
-        }
-        self.blanks.retain(|row| rows.contains(row));
-        for row in &mut self.blanks {
-            *row -= rows.start;
-        }
-        if let Some(stamped) = &mut self.stamped {
-            for all in [&mut stamped.seconds, &mut stamped.of_day, &mut stamped.unit] {
-                *all = all[rows.clone()].to_vec();
+    fn part(&self, rows: &Range<usize>) -> Self {
+        let cut = |all: &[f64]| all.get(rows.clone()).unwrap_or_default().to_vec();
+        let stamped = self.stamped.as_ref().map(|stamped| {
+            let start = stamped.seconds.get(rows.start).copied().unwrap_or(0.0);
+            let mut seconds = cut(&stamped.seconds);
+            seconds.iter_mut().for_each(|s| *s -= start);
+            Stamped {
+                kind: stamped.kind,
+                first: stamped.first.clone(),
+                seconds,
+                of_day: cut(&stamped.of_day),
+                unit: cut(&stamped.unit),
+                midnights: stamped.midnights,
             }
-            let start = stamped.seconds.first().copied().unwrap_or(0.0);
-            stamped.seconds.iter_mut().for_each(|s| *s -= start);
+        });
+        let inside = self.blanks.partition_point(|row| *row < rows.start);
+        let blanks = self.blanks.iter().skip(inside);
+        let blanks = blanks.take_while(|row| **row < rows.end);
+        Self {
+            name: self.name.clone(),
+            unit: self.unit.clone(),
+            values: cut(&self.values),
+            exactness: match &self.exactness {
+                Exactness::Printed(units) => Exactness::Printed(cut(units)),
+                relative => relative.clone(),
+            },
+            blanks: blanks.map(|row| row - rows.start).collect(),
+            stamped,
+            notes: self.notes.clone(),
         }
     }
 }

@@ -21,6 +21,7 @@ pub mod hot_film_nonlinearity;
 pub mod input_nonlinearity;
 pub mod lagging_drive;
 pub mod level_rate;
+mod oscillation;
 pub mod plenum_droop;
 pub mod quadratic_drag;
 pub mod reading_curve;

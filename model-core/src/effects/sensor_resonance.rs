@@ -3,6 +3,7 @@
 //! This is not a missing effect but a property of the sensor. It belongs to the base model, so that neither lags nor
 //! vortex shedding imitate it.
 
+use super::oscillation::{Transition, transition};
 use crate::effect::{Effect, Instant, Parameter, Physics, Place, Setting, Spec, Unit, take};
 use crate::real::Real;
 
@@ -12,9 +13,8 @@ pub struct SensorResonance<T> {
     /// 2ζ/ω and 1/ω, in samples.
     behind: T,
     turn: T,
-    /// The transition over a sample of (y − s, ẏ/ω).
-    from_y: [T; 2],
-    from_rate: [T; 2],
+    /// Of y − s, beside a steady slope.
+    over_a_sample: Transition<T>,
 }
 
 /// The reading y, its rate ẏ/ω, and the last signal.
@@ -40,8 +40,9 @@ impl<T: Real> Effect<T> for SensorResonance<T> {
         let steady = self.behind * change;
         let apart = swing.shown - swing.signal + steady;
         let rate = swing.rate - self.turn * change;
-        swing.shown = signal - steady + self.from_y[0] * apart + self.from_rate[0] * rate;
-        swing.rate = self.turn * change + self.from_y[1] * apart + self.from_rate[1] * rate;
+        let Transition { from_q, from_rate } = &self.over_a_sample;
+        swing.shown = signal - steady + from_q[0] * apart + from_rate[0] * rate;
+        swing.rate = self.turn * change + from_q[1] * apart + from_rate[1] * rate;
         swing.signal = signal;
         swing.shown
     }
@@ -71,18 +72,12 @@ impl<T: Real> Physics<T> for SensorResonance<T> {
 
     fn new(parameters: &[T], setting: &Setting<T>) -> Self {
         let [frequency, damping] = take(parameters);
-        let omega = frequency * T::from_f64(core::f64::consts::TAU);
-        let damping = damping.at_most(T::from_f64(0.999));
-        let damped = (T::ONE - damping * damping).sqrt();
-        let angle = omega * damped * setting.period;
-        let decay = (-damping * omega * setting.period).exp();
-        let (sin, cos) = (angle.sin() * decay / damped, angle.cos() * decay);
+        let (omega, damping, over_a_sample) = transition(frequency, damping, setting.period);
         let turn = T::ONE / (omega * setting.period);
         Self {
             behind: (damping + damping) * turn,
             turn,
-            from_y: [cos + damping * sin, -sin],
-            from_rate: [sin, cos - damping * sin],
+            over_a_sample,
         }
     }
 }

@@ -1,5 +1,6 @@
 //! Jets excite the flow's own oscillation, which the sensor measures in addition to the friction.
 
+use super::oscillation::{Transition, transition};
 use crate::effect::{
     Amplitude, Effect, Instant, Parameter, Physics, Place, Setting, Spec, Unit, take,
 };
@@ -10,9 +11,8 @@ use crate::real::Real;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VortexShedding<T> {
     gain: T,
-    /// The transition over a sample of (q − j, q̇/ω).
-    from_q: [T; 2],
-    from_rate: [T; 2],
+    /// Of q − j.
+    over_a_sample: Transition<T>,
 }
 
 /// The oscillation q and its rate q̇/ω.
@@ -35,8 +35,9 @@ impl<T: Real> Effect<T> for VortexShedding<T> {
         let shown = signal + self.gain * (state.q - at.present);
         let apart = state.q - at.arrived;
         let rate = state.rate;
-        state.q = at.arrived + self.from_q[0] * apart + self.from_rate[0] * rate;
-        state.rate = self.from_q[1] * apart + self.from_rate[1] * rate;
+        let Transition { from_q, from_rate } = &self.over_a_sample;
+        state.q = at.arrived + from_q[0] * apart + from_rate[0] * rate;
+        state.rate = from_q[1] * apart + from_rate[1] * rate;
         shown
     }
 }
@@ -66,16 +67,10 @@ impl<T: Real> Physics<T> for VortexShedding<T> {
 
     fn new(parameters: &[T], setting: &Setting<T>) -> Self {
         let [frequency, damping, gain] = take(parameters);
-        let omega = frequency * T::from_f64(core::f64::consts::TAU);
-        let damping = damping.at_most(T::from_f64(0.999));
-        let damped = (T::ONE - damping * damping).sqrt();
-        let angle = omega * damped * setting.period;
-        let decay = (-damping * omega * setting.period).exp();
-        let (sin, cos) = (angle.sin() * decay / damped, angle.cos() * decay);
+        let (_, _, over_a_sample) = transition(frequency, damping, setting.period);
         Self {
             gain,
-            from_q: [cos + damping * sin, -sin],
-            from_rate: [sin, cos - damping * sin],
+            over_a_sample,
         }
     }
 }

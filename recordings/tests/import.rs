@@ -196,7 +196,7 @@ fn faults_name_the_variable_and_the_remedy() {
         (
             "v7.mat",
             with(|m| m.u = some("vlave")),
-            vec!["no variable `vlave`", "`valve` (40)"],
+            vec!["no variable `vlave`", "`valve` (0.02 to 4.97)"],
         ),
         (
             "matrix.mat",
@@ -204,7 +204,7 @@ fn faults_name_the_variable_and_the_remedy() {
             vec![
                 "which variable is the command u",
                 "--u \"data(:,2)\" --u-threshold 2.49",
-                "`data(:,1)` (40)",
+                "`data(:,1)` (0 to 0.039)",
                 "`Ts` = 0.001",
             ],
         ),

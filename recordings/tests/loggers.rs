@@ -442,14 +442,26 @@ fn a_column_with_two_levels_may_be_the_command() {
     refused(
         rows,
         &[
-            "`U_ac`, which takes the values 0 and 8.5 only",
+            "`U_ac`, whose values lie near 0 and 8.5",
             "--u \"U_ac\" --u-threshold 4.25",
         ],
     );
+    // A monitored voltage scatters.
+    let monitored = "t,AI0,F_z\n0,-0.1,4.1\n0.1,23.9,4.2\n0.2,24.2,4.4\n0.3,0,4.3\n";
+    refused(monitored, &["--u \"AI0\" --u-threshold 12"]);
     refused(
         "t,a,b\n0,0,0\n0.1,2,3\n0.2,2,3\n",
-        &["name it with --u NAME"],
+        &["name it with --u NAME", "`a` (0 to 2)"],
     );
+}
+
+#[test]
+fn a_constant_column_is_not_the_output() {
+    let rows = "t,valve,setpoint,F_z\n0,0,5,4.1\n0.1,1,5,4.2\n0.2,1,5,4.4\n";
+    let told = text("log.csv", rows, &with(|_| {})).unwrap();
+    assert_eq!(told.set.records[0].y, [4.1, 4.2, 4.4]);
+    let rows = "t,valve,setpoint,q,F_z\n0,0,5,1,4.1\n0.1,1,5,2,4.2\n0.2,1,5,1,4.4\n";
+    refused(rows, &["name it with --y NAME", "`setpoint` (always 5)"]);
 }
 
 /// Two runs of three rows, and a pause of the logger within the second.

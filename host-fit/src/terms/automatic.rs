@@ -194,6 +194,8 @@ pub fn base_model(
         if let Some(best) = best.filter(|best| best.size() + RULES.price < found.best.judged.size())
         {
             found.best.judged = best;
+            progress("removing terms that are not needed");
+            found.best = search.pruned(found.best, &found.root);
         }
     }
     let lawful = without_needless_law(&judge, found.best.judged, laws);
@@ -327,11 +329,18 @@ fn without_needless_law(judge: &Judge, judged: Judged, laws: &[Delay]) -> Judged
     }
 }
 
-/// The model with a delay law that depends on the mean of y over `window` samples.
+/// The model with a delay law that depends on the mean of y over `window` samples. The levels of the law follow ỹ, which
+/// is (W − 1)/W of a constant y by eq. (1).
 fn with_average(model: &Model, law: &Delay, window: u32) -> Model {
     let mut other = model.clone();
     if !model.delay.is_alike(law) {
         take_delay_law(&mut other, law);
+    }
+    let share = |window: u32| 1.0 - 1.0 / f64::from(window.max(2));
+    let ratio = share(window) / share(model.averaging.window);
+    if let Delay::Law(law) = &mut other.delay {
+        let parameters = law.parameters.iter_mut().zip(law.spec.parameters);
+        parameters.for_each(|(value, card)| *value *= card.unit.scale(ratio, 1.0, 1.0));
     }
     other.averaging.window = window;
     other
@@ -363,6 +372,25 @@ mod tests {
     use model_core::effects::SENSOR_RESONANCE;
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
+
+    /// The law's level is 0.6 of a constant y at any averaging time.
+    #[test]
+    fn another_averaging_time_keeps_the_delay_at_a_constant_y() {
+        let model = Model {
+            delay: Delay::of::<SaturatingDelay<f64>>(&[20.0, 10.0, 0.6, 0.0], vec![1.0], true),
+            ..Model::default()
+        };
+        let delay = |window: u32, y: f64| {
+            let other = with_average(&model, &model.delay, window);
+            assert_eq!(other.averaging.window, window);
+            let mean = y * (1.0 - 1.0 / f64::from(window));
+            other.delay.present(mean, model.sample_period_s)
+        };
+        for y in [0.1, 0.3, 0.5] {
+            let [short, long] = [2, model.averaging.window].map(|window| delay(window, y));
+            assert!((short - long).abs() < 1e-9, "{y}: {short} {long}");
+        }
+    }
 
     #[test]
     fn a_model_that_diverges_gives_way_to_the_next_one() {

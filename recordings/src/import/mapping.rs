@@ -128,8 +128,8 @@ impl Mapping {
                     let two = only_two_levels(source, &taken);
                     let levels = two.map(|(switch, [low, high])| ImportProblem::TwoLevels {
                         name: printable(&switch.name),
-                        low,
-                        high,
+                        low: brief(low, 2),
+                        high: brief(high, 2),
                         middle: brief((low + high) / 2.0, 2),
                         found: source.listed(),
                     });

@@ -1,6 +1,7 @@
 //! Assignment of a file's variables: by the name in an option, by a usual name, or because only one variable
 //! is suitable.
 
+use super::mapping::near_two_levels;
 use super::problem::ImportProblem;
 use super::source::{Source, Variable};
 use crate::error::{DataError, FilePlace};
@@ -9,8 +10,8 @@ use crate::error::{DataError, FilePlace};
 pub(super) const TIMES: &str = "t time zeit temps tout x_value time_s t_s sec secs seconds elapsed elapsed_s elapsed_time \
     time_ms t_ms elapsed_ms millis milliseconds ms time_us t_us micros microseconds us \
     time_min t_min timestamp timestamps time_stamp timestamp_ms timestamp_us datetime \
-    date_time date_and_time zeitstempel epoch unixtime unix_time clock uhrzeit date datum \
-    received";
+    date_time date_and_time zeitstempel epoch epoch_s epoch_ms epoch_us unixtime unix_time unix unix_s unix_ms \
+    clock uhrzeit date datum received";
 
 /// Usual names of the command.
 pub(super) const COMMANDS: &str = "u input command valve actuator ventil cmd stell heater heizung pwm duty duty_cycle relay \
@@ -118,25 +119,23 @@ pub(super) fn only_switch<'a>(source: &'a Source, taken: &[&Variable]) -> Option
     only(source, taken, is_switch)
 }
 
-/// The only variable not in `taken` that takes two values, and these values in ascending order.
+/// The only variable not in `taken` that lies near two levels, and these levels in ascending order.
 pub(super) fn only_two_levels<'a>(
     source: &'a Source,
     taken: &[&Variable],
 ) -> Option<(&'a Variable, [f64; 2])> {
     let levels = |v: &Variable| {
-        let mut present = v.values.iter().copied().filter(|value| !value.is_nan());
-        let first = present.next()?;
-        let other = present.find(|value| *value != first)?;
-        let two = present.all(|value| value == first || value == other);
-        two.then_some([first.min(other), first.max(other)])
+        let present: Vec<f64> = v.values.iter().copied().filter(|v| !v.is_nan()).collect();
+        near_two_levels(&present)
     };
     let found = only(source, taken, |v| levels(v).is_some())?;
-    Some((found, levels(found)?))
+    let (low, high) = levels(found)?;
+    Some((found, [low, high]))
 }
 
-/// The output without a usual name: the only numeric variable not in `taken`.
+/// The output without a usual name: the only numeric variable not in `taken` that is not constant.
 pub(super) fn only_other<'a>(source: &'a Source, taken: &[&Variable]) -> Option<&'a Variable> {
-    only(source, taken, |_| true)
+    only(source, taken, |v| !v.is_constant())
 }
 
 fn only<'a>(

@@ -118,9 +118,9 @@ pub enum ImportProblem {
         /// The names found.
         found: String,
     },
-    /// No usual name identifies the command, but one variable takes two values.
+    /// No usual name identifies the command, but one variable lies near two levels.
     #[error(
-        "it is not clear which variable is the command u; if it is `{name}`, which takes the values {low} and {high} only, give --u \"{name}\" --u-threshold {middle}; otherwise name it with --u NAME; the file has {found}"
+        "it is not clear which variable is the command u; if it is `{name}`, whose values lie near {low} and {high}, give --u \"{name}\" --u-threshold {middle}; otherwise name it with --u NAME; the file has {found}"
     )]
     TwoLevels {
         /// The variable.

@@ -74,6 +74,20 @@ pub struct Variable {
     pub(super) notes: Vec<String>,
 }
 
+impl Variable {
+    /// The lowest and the highest value; `None` without a value.
+    pub(super) fn range(&self) -> Option<(f64, f64)> {
+        let mut present = self.values.iter().copied().filter(|value| !value.is_nan());
+        let first = present.next()?;
+        Some(present.fold((first, first), |(low, high), v| (low.min(v), high.max(v))))
+    }
+
+    /// Whether all values are equal.
+    pub(super) fn is_constant(&self) -> bool {
+        self.range().is_none_or(|(low, high)| low == high)
+    }
+}
+
 /// A column of a text table with a cell that cannot be read.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Unread {
@@ -145,14 +159,24 @@ impl Source {
             .or_else(|| by(&|v| unit.is_some() && v.name == bare && v.unit == unit))
     }
 
-    /// The names with their lengths, for messages.
+    /// The names with their ranges, and with their lengths if these differ, for messages.
     pub(super) fn listed(&self) -> String {
         const MOST: usize = 24;
+        let all = self.variables.iter().map(|v| v.values.len());
+        let mut lengths = all.filter(|length| *length > 1);
+        let first = lengths.next();
+        let differ = lengths.any(|length| Some(length) != first);
         let each = |v: &Variable| {
             let name = printable(&v.name);
-            match v.values.as_slice() {
-                [one] => format!("`{name}` = {one}"),
-                many => format!("`{name}` ({})", many.len()),
+            let count = match differ {
+                true => format!("{} values, ", v.values.len()),
+                false => String::new(),
+            };
+            match (v.values.as_slice(), v.range()) {
+                ([one], _) => format!("`{name}` = {one}"),
+                (_, None) => format!("`{name}` ({count}no number)"),
+                (_, Some((low, high))) if low == high => format!("`{name}` ({count}always {low})"),
+                (_, Some((low, high))) => format!("`{name}` ({count}{low} to {high})"),
             }
         };
         let mut list: Vec<String> = self.variables.iter().map(each).take(MOST).collect();

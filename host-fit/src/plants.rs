@@ -131,6 +131,10 @@ fn nearest_plant(model: &Model) -> anyhow::Result<(PlantSpec, Vec<String>)> {
     for added in physical {
         match physical_effect(&added.name, &added.parameters) {
             Ok(effect) => effects.push(effect),
+            Err(_) if model.definition(&added.name).is_some() => left_out.push(format!(
+                "stress trials use plants without {}, which is not an effect of the simulator",
+                added.name
+            )),
             Err(error) => left_out.push(format!(
                 "stress trials use plants without {}, which the simulator cannot represent: {error:#}",
                 added.name

@@ -182,7 +182,8 @@ impl Session<'_> {
     }
 
     /// The certificate of each effect of `subject`: the largest evidence of the models with the effect, divided by the
-    /// largest evidence of the models that contain neither the effect nor another member of its equivalence set. A
+    /// largest evidence of the models that contain neither the effect, nor another member of its equivalence set, nor an
+    /// effect that reads the same channel. A
     /// model without the effect may have more evidence than `subject` because of its other terms; the effect is
     /// therefore also added to such models.
     pub(super) fn certificates(
@@ -210,13 +211,26 @@ impl Session<'_> {
             let name = effect.name.to_owned();
             let set = sets.iter().find(|set| set.effect.name == name);
             let names = set.map_or_else(|| vec![name.clone()], Set::names);
-            let names: Vec<&str> = names.iter().map(String::as_str).collect();
-            let rivals = others.iter().filter_map(|rival| rival.refitted.as_ref());
+            let rivals = || others.iter().filter_map(|rival| rival.refitted.as_ref());
+            // What reads the same channel says the same: that y depends on it.
+            let alike = found
+                .all
+                .iter()
+                .chain(rivals())
+                .flat_map(|model| &model.terms);
+            let alike = alike.filter_map(Term::effect);
+            let alike =
+                alike.filter(|other| effect.channel.is_some() && other.channel == effect.channel);
+            let names: Vec<&str> = names
+                .iter()
+                .map(String::as_str)
+                .chain(alike.map(|other| other.name))
+                .collect();
             let nulls = [
                 Some(found.bare.clone()),
                 lesser[index].take(),
                 Hypothesis::best_without(found.all.iter(), &names).cloned(),
-                Hypothesis::best_without(rivals, &names).cloned(),
+                Hypothesis::best_without(rivals(), &names).cloned(),
             ];
             let places = nulls.into_iter().flatten().map(|null| {
                 let is_same = |other: &Hypothesis| is_same(other, &null);

@@ -12,6 +12,7 @@ use crate::parallel;
 use crate::terms::{
     Found, HeldOut, Hypothesis, Judge, Judged, Likelihood, Search, Term, Units, p_value,
 };
+use crate::user_effect::Definition;
 use model_core::effect::Spec;
 use std::collections::BTreeMap;
 use std::sync::Mutex;
@@ -189,7 +190,11 @@ impl Session<'_> {
         let evident = order.iter().take(way.proven).take_while(holds).count();
         let is_known = |spec: &&&'static Spec| is_identified(&parameters[spec.name], spec);
         let known = order.iter().take_while(is_known).count();
-        let proven = if claims { evident.min(known) } else { 0 };
+        let proven = if claims {
+            evident.min(known).min(decided(&order, last.judged.model()))
+        } else {
+            0
+        };
         let (verdict, claims) = match claims && proven == 0 {
             true => (Verdict::PartlyExplained, false),
             false => (verdict, claims),
@@ -350,13 +355,44 @@ impl Session<'_> {
     }
 }
 
+/// How many effects of `order` can be named. The base was identified without the measured channels that lead; what follows
+/// them is decided when it is identified with them.
+fn decided(order: &[&'static Spec], model: &Model) -> usize {
+    let of_channel = |spec: &&&'static Spec| {
+        let own = model.definition(spec.name);
+        own.is_some_and(Definition::is_of_a_channel)
+    };
+    match order.iter().take_while(of_channel).count() {
+        0 => order.len(),
+        leading => leading,
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::residual::plants::{base, drift, records};
-    use crate::terms::Bench;
+    use crate::terms::{Bench, measured_inputs};
     use model_core::effects::spec;
     use std::sync::atomic::AtomicBool;
+
+    #[test]
+    fn what_follows_a_measured_channel_is_decided_later() {
+        let mut records = records(&[], &[], 1);
+        let wander = |k: usize| 300.0 + 20.0 * (k as f64 / 90.0).sin();
+        let q = (0..records[0].len()).map(wander).collect();
+        records[0].channels.insert("q".to_owned(), q);
+        let model = base(&records).with_inputs(measured_inputs(&records));
+        let known = |name: &str| model.spec(name).expect("known");
+        let [lag, drift] = ["valve-lag", "thermal-drift"].map(known);
+        let [input, scaled] = ["input-q", "scaled-by-q"].map(known);
+        let of = |order: &[&'static Spec]| decided(order, &model);
+        assert_eq!(of(&[scaled, lag, drift]), 1);
+        assert_eq!(of(&[input, scaled, lag]), 2);
+        assert_eq!(of(&[lag, scaled, drift]), 3);
+        assert_eq!(of(&[lag, drift]), 2);
+        assert_eq!(of(&[]), 0);
+    }
 
     /// A drift is hidden. A vortex in the same model has an amplitude whose interval contains 0. The uncertainty
     /// must be attributed to the vortex.

@@ -104,7 +104,7 @@ impl Coordinate {
             | Self::Time => Unit::Second,
             Self::MemoryOfRate(_) => Unit::Other("y/s"),
             Self::PulseNumber | Self::MemoryOfU(_) => Unit::None,
-            Self::Channel(_) => Unit::Other("of the channel"),
+            Self::Channel(_) => Unit::Other("above its mean"),
         }
     }
 

@@ -9,6 +9,7 @@ use crate::discover::Glance;
 use crate::picture::{significant, time};
 use crate::residual::NoiseSource;
 use crate::terms::second_lag_s;
+use crate::user_effect::Definition;
 use model_core::effect::Place;
 use model_core::effects::spec;
 
@@ -138,7 +139,12 @@ fn finding(diagnosis: &Diagnosis, plant: Plant) -> Answer {
     let add = |names: &[String]| {
         let effects = names.iter().map(|name| format!(" --effect {name}"));
         let effects: String = effects.collect();
-        format!("host-fit extend model.toml DATASET{effects} -o better.toml")
+        // Further effects are judged on a base that was identified with the channels.
+        let command = match of_channels(diagnosis) && !diagnosis.stand_ins.is_empty() {
+            true => "identify DATASET",
+            false => "extend model.toml DATASET",
+        };
+        format!("host-fit {command}{effects} -o better.toml")
     };
     let discover = "host-fit discover model.toml DATASET -o new.toml";
     match diagnosis.verdict {
@@ -312,6 +318,15 @@ fn missing(names: &[String], sets: &[Vec<String>]) -> String {
     }
 }
 
+/// Whether all named effects are the tool's own for measured channels.
+fn of_channels(diagnosis: &Diagnosis) -> bool {
+    let mut own = diagnosis
+        .missing
+        .iter()
+        .map(|name| diagnosis.model.definition(name));
+    !diagnosis.missing.is_empty() && own.all(|own| own.is_some_and(Definition::is_of_a_channel))
+}
+
 /// Surrogates in addition to named effects.
 fn surrogates(answer: &mut Answer, diagnosis: &Diagnosis, plant: Plant) {
     if diagnosis.verdict != Verdict::EffectMissing || diagnosis.stand_ins.is_empty() {
@@ -319,11 +334,15 @@ fn surrogates(answer: &mut Answer, diagnosis: &Diagnosis, plant: Plant) {
     }
     let several = diagnosis.stand_ins.len() > 1;
     answer.note(format!(
-        "{} {} in the model as {}: not significant together with the named effects, or not identifiable on \
-             these records.",
+        "{} {} in the model as {}: {}.",
         joined(&named(&diagnosis.stand_ins, plant)),
         if several { "are" } else { "is" },
         if several { "surrogates" } else { "a surrogate" },
+        match of_channels(diagnosis) {
+            true => "the model was identified without the measured channel, and what else is missing is decided after \
+                     it is identified with the channel",
+            false => "not significant together with the named effects, or not identifiable on these records",
+        }
     ));
 }
 

@@ -1,4 +1,5 @@
-//! A measured channel as a second input of the plant: a second heater, a fan, the ambient temperature.
+//! A measured channel as a second input of the plant (a second heater, a fan, the ambient temperature), and as a
+//! factor of the reading (the dynamic pressure at a balance, the temperature at a hot film).
 
 use super::RULES;
 use crate::data::Record;
@@ -14,13 +15,13 @@ use model_core::effects::SPECS;
 const RANKED: usize = 256;
 const RANKED_SAMPLES: usize = 2000;
 
-/// The [`measured_inputs`] that a diagnosis of `given` tries. If there are many, the inputs whose response (a
-/// first-order lag with dead time) explains most of the residual of `given`.
+/// The effects of measured channels that a diagnosis of `given` tries. If there are many channels, those whose response
+/// (a first-order lag with dead time) explains most of the residual of `given`.
 #[must_use]
 pub(crate) fn leading_inputs(given: &Model, records: &[Record]) -> Vec<&'static Definition> {
-    let inputs = measured_inputs(records);
+    let inputs = channels_that_vary(records);
     if inputs.len() <= RULES.inputs {
-        return inputs;
+        return effects_of(inputs.iter());
     }
     let samples: usize = records.iter().map(Record::len).sum();
     let stride = samples.div_ceil(RANKED_SAMPLES).max(1);
@@ -41,12 +42,14 @@ pub(crate) fn leading_inputs(given: &Model, records: &[Record]) -> Vec<&'static 
         .collect();
     let inputs = &inputs[..inputs.len().min(RANKED)];
     let mut ranked = parallel::each(inputs, |input| {
-        let channel = input.spec().channel.unwrap_or_default();
         let follows: Vec<Record> = records
             .iter()
             .zip(&left)
             .map(|(record, left)| {
-                let u = record.channels.get(channel).map(|values| thinned(values));
+                let u = record
+                    .channels
+                    .get(input.name)
+                    .map(|values| thinned(values));
                 let period = record.sample_period_s * stride as f64;
                 Record::new(
                     &record.name,
@@ -59,15 +62,12 @@ pub(crate) fn leading_inputs(given: &Model, records: &[Record]) -> Vec<&'static 
             .collect();
         (
             FirstOrder::fitted(&follows).map_or(0.0, |found| found.explained),
-            *input,
+            input,
         )
     });
     order::descending(&mut ranked, |(explained, _)| *explained);
-    ranked
-        .into_iter()
-        .take(RULES.inputs)
-        .map(|(_, input)| input)
-        .collect()
+    let leading = ranked.into_iter().take(RULES.inputs);
+    effects_of(leading.map(|(_, input)| input))
 }
 
 /// A signal over all records, joined.
@@ -75,12 +75,29 @@ fn joined(records: &[Record], of: impl Fn(&Record) -> Vec<f64>) -> Vec<f64> {
     records.iter().flat_map(of).collect()
 }
 
-/// An effect for each measured channel of `records`: it adds a response to the channel to the reading. A channel
-/// must be in all records, vary, not be read by an effect of the catalogue, and not be a copy of y, the command or
-/// a clock. The response is a first-order lag with dead time of the channel's deviation from its first value, as a
-/// fraction of its range. At rest the channel has its first value and the response is 0.
+/// A measured channel with its values over all records.
+struct Channel<'a> {
+    name: &'a str,
+    low: f64,
+    high: f64,
+}
+
+/// Two effects for each measured channel of `records`. One adds a response to the channel to the reading: a first-order
+/// lag with dead time of the channel's deviation from its first value, as a fraction of its range; at rest the channel
+/// has its first value and the response is 0. The other multiplies the reading by a linear function of the channel, if
+/// the channel does not change its sign. A channel must be in all records, vary, not be read by an effect of the
+/// catalogue, and not be a copy of y, the command or a clock.
 #[must_use]
 pub(crate) fn measured_inputs(records: &[Record]) -> Vec<&'static Definition> {
+    effects_of(channels_that_vary(records).iter())
+}
+
+fn effects_of<'a>(channels: impl Iterator<Item = &'a Channel<'a>>) -> Vec<&'static Definition> {
+    let both = |channel: &Channel<'_>| [measured_input(channel), scaled_by(channel)];
+    channels.flat_map(both).flatten().collect()
+}
+
+fn channels_that_vary(records: &[Record]) -> Vec<Channel<'_>> {
     let Some(first) = records.first() else {
         return Vec::new();
     };
@@ -93,10 +110,11 @@ pub(crate) fn measured_inputs(records: &[Record]) -> Vec<&'static Definition> {
         joined(records, |r| r.u.clone()),
         joined(records, |r| (0..r.len()).map(|k| k as f64).collect()),
     ];
-    let inputs = names.filter_map(|name| {
+    let varying = names.filter_map(|name| {
         let own = joined(records, |r| r.channels[name].clone());
         let low = own.iter().copied().fold(f64::INFINITY, f64::min);
-        let range = own.iter().copied().fold(f64::NEG_INFINITY, f64::max) - low;
+        let high = own.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let range = high - low;
         if !(range.is_finite() && range > 0.0) {
             return None;
         }
@@ -105,19 +123,62 @@ pub(crate) fn measured_inputs(records: &[Record]) -> Vec<&'static Definition> {
         let is_again = |known: &Vec<f64>| {
             correlation(&scaled, known).is_some_and(|(r, _)| r.abs() > RULES.same_quantity)
         };
-        (!known.iter().any(is_again)).then(|| measured_input(name, range))?
+        (!known.iter().any(is_again)).then_some(Channel { name, low, high })
     });
-    inputs.collect()
+    varying.collect()
 }
 
-/// The effect of the channel called `channel`, which covers `range`.
-fn measured_input(channel: &str, range: f64) -> Option<&'static Definition> {
+/// The channel's name in that of an effect.
+fn in_a_name(channel: &str) -> String {
     let words = channel.to_lowercase();
     let words = words.split(|c: char| !c.is_ascii_alphanumeric());
     let words: Vec<&str> = words.filter(|word| !word.is_empty()).collect();
-    let (name, signal) = (words.join("-"), channel_signal(channel));
-    let summary = format!("a response of y to the measured channel `{channel}`");
-    let [quoted, summary] = [channel.to_owned(), summary].map(toml::Value::String);
+    words.join("-")
+}
+
+/// The reading as a multiple of a linear function of the channel, beginning at the reading that does not depend on it.
+fn scaled_by(channel: &Channel<'_>) -> Option<&'static Definition> {
+    if channel.low * channel.high <= 0.0 {
+        return None;
+    }
+    let (name, signal) = (in_a_name(channel.name), channel_signal(channel.name));
+    let summary = format!(
+        "the reading scales with the measured channel `{}`",
+        channel.name
+    );
+    let [quoted, summary] = [channel.name.to_owned(), summary].map(toml::Value::String);
+    let text = format!(
+        r#"name = "scaled-by-{name}"
+place = "sensor"
+summary = {summary}
+source = "calibration: to first order the sensitivity is a linear function of the channel"
+channel = {quoted}
+scales = true
+expression = "reading + gain * ({signal} / reference - 1.0) * (reading - zero)"
+[[parameter]]
+name = "gain"
+unit = "-"
+low = -10.0
+high = 10.0
+starts = [1.0, -0.5]
+[[parameter]]
+name = "zero"
+unit = "reading"
+low = -100.0
+high = 100.0
+starts = [0.0, -2.0]
+"#
+    );
+    // A name that is too long is not valid for an effect.
+    Definition::from_toml(&text, channel.name).ok()
+}
+
+/// The response to the channel.
+fn measured_input(channel: &Channel<'_>) -> Option<&'static Definition> {
+    let (name, signal) = (in_a_name(channel.name), channel_signal(channel.name));
+    let range = channel.high - channel.low;
+    let summary = format!("a response of y to the measured channel `{}`", channel.name);
+    let [quoted, summary] = [channel.name.to_owned(), summary].map(toml::Value::String);
     let text = format!(
         r#"name = "input-{name}"
 place = "sensor"
@@ -157,13 +218,14 @@ starts = [0.0, 0.02, 0.08, 0.25]
 "#
     );
     // A name that is too long is not valid for an effect.
-    Definition::from_toml(&text, channel).ok()
+    Definition::from_toml(&text, channel.name).ok()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::data::Use;
+    use model_core::effects::ZERO_OFFSET;
 
     fn record(names: &[&str]) -> Record {
         let u = vec![0.0; 900];
@@ -185,7 +247,7 @@ mod tests {
             .insert("still".to_owned(), vec![1.0; 900]);
         let inputs = measured_inputs(&records);
         let names: Vec<&str> = inputs.iter().map(|input| input.spec().name).collect();
-        assert_eq!(names, ["input-heater-2"]);
+        assert_eq!(names, ["input-heater-2", "scaled-by-heater-2"]);
         // The channels are the reading in another unit, a copy of the command, and a clock.
         for record in &mut records {
             record.u = (0..900)
@@ -203,7 +265,7 @@ mod tests {
             .iter()
             .map(|i| i.spec().name)
             .collect();
-        assert_eq!(names, ["input-heater-2"]);
+        assert_eq!(names, ["input-heater-2", "scaled-by-heater-2"]);
         // One record lacks the channel.
         assert!(measured_inputs(&[records[0].clone(), record(&[])]).is_empty());
     }
@@ -228,7 +290,38 @@ mod tests {
             .iter()
             .map(|i| i.spec().name)
             .collect();
+        // The other channels begin at 0, so that nothing scales with them.
         assert_eq!((names.len(), names[0]), (RULES.inputs, "input-c7"));
+    }
+
+    /// Twice the channel's relative change, of all that is above 1; the offset of 3 is part of the reading.
+    #[test]
+    fn the_reading_is_a_multiple_of_a_linear_function_of_the_channel() {
+        let records = [record(&["q"])];
+        let scaled = scaled_by(&Channel {
+            name: "q",
+            low: 2.0,
+            high: 5.0,
+        })
+        .expect("of one sign");
+        let mut model = Model::default();
+        model.define(scaled).expect("a new name");
+        model.add(scaled.spec(), &[2.0, 1.0], Some(4.0));
+        model.add(ZERO_OFFSET, &[3.0], None);
+        let y = model.free_run(&records[0]).expect("it does not diverge");
+        for (k, y) in y.iter().enumerate() {
+            let q = if k < 300 { 2.0 } else { 5.0 };
+            let expected = 3.0 + 2.0 * (q / 4.0 - 1.0) * (3.0 - 1.0);
+            assert!((y - expected).abs() < 1e-9, "{k}: {y}");
+        }
+        assert!(
+            scaled_by(&Channel {
+                name: "t",
+                low: -2.0,
+                high: 5.0
+            })
+            .is_none()
+        );
     }
 
     #[test]

@@ -174,9 +174,14 @@ impl Definition {
         self.source.scales
     }
 
-    /// Whether the effect is a measured input.
-    pub(crate) fn is_measured_input(&self) -> bool {
+    /// Whether the effect is the tool's own for a measured channel.
+    pub(crate) fn is_of_a_channel(&self) -> bool {
         self.scales() && self.spec.channel.is_some()
+    }
+
+    /// Whether the effect is a measured input: a channel with a response of its own.
+    pub(crate) fn is_measured_input(&self) -> bool {
+        self.is_of_a_channel() && self.source.has_states()
     }
 
     /// Operations of the effect at a sample.

@@ -3,7 +3,7 @@
 use super::expression::{Compiler, Fault, Kind, Meaning, Typed};
 use super::program::{Carried, Op, Program, Signal};
 use super::{module_name, type_name};
-use model_core::effect::{Parameter, Place, RustType, Spec, Unit};
+use model_core::effect::{Parameter, Place, RustType, Spec, Turn, Unit};
 use serde::{Deserialize, Serialize};
 
 /// Contents of an effect file, as stored in a model file.
@@ -60,6 +60,9 @@ pub(super) enum Refusal {
     Expression(String, Fault),
 }
 
+/// The unit of a parameter that is a reading with the sensor's offset, in files.
+const READING: &str = "reading";
+
 /// A name of a signal, state or parameter.
 fn is_identifier(name: &str) -> bool {
     name.starts_with(|c: char| c.is_ascii_lowercase())
@@ -93,6 +96,11 @@ fn is_effect_name(name: &str) -> bool {
 }
 
 impl Source {
+    /// Whether the effect stores anything from sample to sample.
+    pub(super) fn has_states(&self) -> bool {
+        !self.state.is_empty()
+    }
+
     fn place(&self) -> Place {
         match self.place {
             SourcePlace::Jet => Place::Jet,
@@ -216,13 +224,10 @@ impl Source {
     }
 
     pub(super) fn spec(&self, program: &Program) -> Spec {
-        fn keep(text: &str) -> &'static str {
-            String::leak(text.to_owned())
-        }
         let parameters = self.parameter.iter().enumerate().map(|(index, parameter)| {
             let card = Parameter::new(
                 keep(&parameter.name),
-                Unit::of(keep(&parameter.unit)),
+                parameter.unit(),
                 [parameter.low, parameter.high],
                 Vec::leak(parameter.starts.clone()),
             );
@@ -233,6 +238,7 @@ impl Source {
             }
         });
         let parameters: Vec<Parameter> = parameters.collect();
+        let reads_offset = parameters.iter().any(|card| card.unit == Unit::Reading);
         Spec {
             name: keep(&self.name),
             rust: keep(&format!(
@@ -246,6 +252,10 @@ impl Source {
             equation: keep(&self.equation()),
             parameters: Vec::leak(parameters),
             channel: self.channel.as_deref().map(keep),
+            turn: match reads_offset {
+                true => Turn::Last,
+                false => Turn::InOrder,
+            },
             source: keep(self.reference.as_deref().unwrap_or("the user's own effect")),
             ..Spec::PLAIN
         }
@@ -269,7 +279,20 @@ impl Source {
     }
 }
 
+/// Text for a card, which lives as long as the program.
+fn keep(text: &str) -> &'static str {
+    String::leak(text.to_owned())
+}
+
 impl SourceParameter {
+    /// The unit; [`READING`] is that of a reading with the sensor's offset.
+    fn unit(&self) -> Unit {
+        match self.unit.as_str() {
+            READING => Unit::Reading,
+            other => Unit::of(keep(other)),
+        }
+    }
+
     fn check(&self) -> Result<(), String> {
         let finite = |value: &f64| (*value as f32).is_finite();
         if !(finite(&self.low) && finite(&self.high) && self.low < self.high) {

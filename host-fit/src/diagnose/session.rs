@@ -379,6 +379,7 @@ mod tests {
     #[test]
     fn what_follows_a_measured_channel_is_decided_later() {
         let mut records = records(&[], &[], 1);
+        records.truncate(1);
         let wander = |k: usize| 300.0 + 20.0 * (k as f64 / 90.0).sin();
         let q = (0..records[0].len()).map(wander).collect();
         records[0].channels.insert("q".to_owned(), q);

@@ -665,7 +665,7 @@ fn files_of_other_programs_become_a_data_set() {
     refused(
         "import {} -o {} --like {}",
         &[&next, &other, &out],
-        &["german.csv", "no variable `valve`", "`Zeit` (40)"],
+        &["german.csv", "no variable `valve`", "`Zeit` (0 to 39)"],
     );
     assert!(!other.exists(), "nothing half-written");
 }

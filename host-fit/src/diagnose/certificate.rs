@@ -7,6 +7,7 @@ use super::session::Session;
 use crate::model::Model;
 use crate::parallel;
 use crate::terms::{Found, Hypothesis, MostLikely, Term, log_e, p_of};
+use model_core::effect::Spec;
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::PoisonError;
@@ -183,9 +184,8 @@ impl Session<'_> {
 
     /// The certificate of each effect of `subject`: the largest evidence of the models with the effect, divided by the
     /// largest evidence of the models that contain neither the effect, nor another member of its equivalence set, nor an
-    /// effect that reads the same channel. A
-    /// model without the effect may have more evidence than `subject` because of its other terms; the effect is
-    /// therefore also added to such models.
+    /// effect that reads the same channel. A model without the effect may have more evidence than `subject` because of
+    /// its other terms; the effect is therefore also added to such models.
     pub(super) fn certificates(
         &self,
         subject: &Hypothesis,
@@ -213,19 +213,13 @@ impl Session<'_> {
             let names = set.map_or_else(|| vec![name.clone()], Set::names);
             let rivals = || others.iter().filter_map(|rival| rival.refitted.as_ref());
             // What reads the same channel says the same: that y depends on it.
-            let alike = found
-                .all
-                .iter()
-                .chain(rivals())
-                .flat_map(|model| &model.terms);
-            let alike = alike.filter_map(Term::effect);
-            let alike =
-                alike.filter(|other| effect.channel.is_some() && other.channel == effect.channel);
-            let names: Vec<&str> = names
-                .iter()
-                .map(String::as_str)
-                .chain(alike.map(|other| other.name))
-                .collect();
+            let models = found.all.iter().chain(rivals());
+            let terms = models.flat_map(|model| &model.terms);
+            let reads_it =
+                |other: &&Spec| effect.channel.is_some() && other.channel == effect.channel;
+            let alike = terms.filter_map(Term::effect).filter(reads_it);
+            let names = names.iter().map(String::as_str);
+            let names: Vec<&str> = names.chain(alike.map(|other| other.name)).collect();
             let nulls = [
                 Some(found.bare.clone()),
                 lesser[index].take(),

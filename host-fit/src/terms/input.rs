@@ -75,7 +75,7 @@ fn joined(records: &[Record], of: impl Fn(&Record) -> Vec<f64>) -> Vec<f64> {
     records.iter().flat_map(of).collect()
 }
 
-/// A measured channel with its values over all records.
+/// A measured channel with its range over all records.
 struct Channel<'a> {
     name: &'a str,
     low: f64,
@@ -97,6 +97,7 @@ fn effects_of<'a>(channels: impl Iterator<Item = &'a Channel<'a>>) -> Vec<&'stat
     channels.flat_map(both).flatten().collect()
 }
 
+/// The channels that fulfil the conditions of [`measured_inputs`].
 fn channels_that_vary(records: &[Record]) -> Vec<Channel<'_>> {
     let Some(first) = records.first() else {
         return Vec::new();

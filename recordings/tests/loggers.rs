@@ -464,6 +464,28 @@ fn a_constant_column_is_not_the_output() {
     refused(rows, &["name it with --y NAME", "`setpoint` (always 5)"]);
 }
 
+#[test]
+fn a_sample_may_be_the_mean_of_several_rows() {
+    let rows = "t,valve,y,q\n0,0,1,10\n0.1,0,3,20\n0.2,0,5,30\n0.3,1,7,10\n0.4,1,9,20\n0.5,1,11,30\n0.6,1,13,0\n";
+    let mean = |rows_of: usize| text("log.csv", rows, &with(|m| m.mean_of = Some(rows_of)));
+    let set = mean(3).unwrap().set;
+    let [record] = set.records.as_slice() else {
+        panic!("one record");
+    };
+    assert_eq!(
+        (record.y.as_slice(), record.u.as_slice()),
+        (&[3.0, 9.0][..], &[0.0, 1.0][..])
+    );
+    assert_eq!(record.channels["q"], [20.0, 20.0]);
+    assert!((set.sample_period_s - 0.3).abs() < 1e-12 && (record.t0 - 0.1).abs() < 1e-12);
+    // The command of a sample is that of most of its rows.
+    assert_eq!(mean(2).unwrap().set.records[0].u, [0.0, 1.0, 1.0]);
+    for (rows_of, says) in [(1, "2 or more"), (4, "at least twice as many rows")] {
+        let error = mean(rows_of).unwrap_err().to_string();
+        assert!(error.contains(says), "{error}");
+    }
+}
+
 /// Two runs of three rows, and a pause of the logger within the second.
 #[test]
 fn a_file_with_several_runs_becomes_several_records() {

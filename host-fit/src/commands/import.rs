@@ -53,6 +53,9 @@ pub(crate) struct Args {
     /// the time, where the time starts again and after a pause.
     #[arg(long, value_name = "NAME")]
     split_by: Option<String>,
+    /// Each sample is the mean of this many rows: for a recording that is much faster than the plant.
+    #[arg(long, value_name = "ROWS")]
+    mean_of: Option<usize>,
     /// Variable that is the command.
     #[arg(long, value_name = "NAME")]
     u: Option<String>,
@@ -131,6 +134,7 @@ impl Args {
             ignore_time: self.ignore_time || base.ignore_time,
             fill_gaps_s: self.fill_gaps.or(base.fill_gaps_s),
             split_by: self.split_by.clone().or(base.split_by),
+            mean_of: self.mean_of.or(base.mean_of),
             u: self.u.clone().or(base.u),
             u_scale: self.u_scale.or(base.u_scale),
             u_offset: self.u_offset.or(base.u_offset),

@@ -6,6 +6,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use super::gaps::{Filling, Gaps};
+use super::mean::{mean_of, origin_of};
 use super::names::{
     COMMANDS, CONTROLLER_OUTPUTS, OUTPUTS, PROCESS_VALUES, TIMES, find, is_in_percent, known_as,
     only_other, only_switch, only_two_levels,
@@ -40,6 +41,9 @@ pub struct Mapping {
     /// after pauses. `None`: a file is one record.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub split_by: Option<String>,
+    /// A sample is the mean of this many rows, at least 2; `None`: of one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mean_of: Option<usize>,
     /// Name of the command. With `None` it is found by its usual names.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub u: Option<String>,
@@ -206,6 +210,9 @@ impl Mapping {
             if value.is_some_and(|v| !v.is_finite()) {
                 return Err(ImportProblem::BadNumber(name));
             }
+        }
+        if self.mean_of.is_some_and(|rows| rows < 2) {
+            return Err(ImportProblem::MeanOfOne);
         }
         Ok(())
     }
@@ -376,10 +383,18 @@ impl Mapping {
         let passed_over = source.skipped.iter();
         remarks.extend(passed_over.map(|(name, why)| format!("`{name}` is left out: {why}")));
         let lines = gaps.rows.iter().filter_map(|&row| source.lines.get(row));
-        let origin = Origin {
+        let mut origin = Origin {
             lines: lines.copied().collect(),
             ..origin
         };
+        if let Some(rows) = self.mean_of {
+            if record.len() < 2 * rows {
+                let samples = record.len();
+                return Err(fault(ImportProblem::TooFewRows { rows, samples }));
+            }
+            record = mean_of(record, rows, &mut remarks);
+            origin = origin_of(origin, rows, record.len());
+        }
         Ok(Mapped {
             record,
             origin,

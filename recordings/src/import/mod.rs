@@ -10,6 +10,7 @@ mod gaps;
 mod labelled;
 mod mapping;
 mod mat;
+mod mean;
 mod names;
 mod npy;
 mod open;

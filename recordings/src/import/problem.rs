@@ -140,6 +140,17 @@ pub enum ImportProblem {
              file has {0}"
     )]
     NoTime(String),
+    /// Means of fewer than two rows.
+    #[error("mean_of must be 2 or more: the number of rows of which each sample is the mean")]
+    MeanOfOne,
+    /// A record that is too short for means of this many rows.
+    #[error("a mean of {rows} rows needs at least twice as many rows; the record has {samples}")]
+    TooFewRows {
+        /// Rows of which a sample is the mean.
+        rows: usize,
+        /// Rows of the record.
+        samples: usize,
+    },
     /// A scale that is 0 or not finite.
     #[error("{0} must be a finite number other than 0")]
     BadScale(&'static str),

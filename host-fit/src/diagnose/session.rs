@@ -119,13 +119,22 @@ impl Session<'_> {
             .filter(|conclusion| !conclusion.effects.is_empty())
             .unwrap_or_else(|| concluded(&named));
         // A fit with fewer effects may have converged further; then it is the result.
-        let way = loop {
+        let mut way = loop {
             let mut way = self.way(&conclusion, &found.root);
             match way.better.take() {
                 Some(better) => conclusion = concluded(&better),
                 None => break way,
             }
         };
+        // If no effect has a certificate and the given model is as good without them, the given model is the answer.
+        let as_good = |of: &Judged| self.as_given.rmse() <= (1.0 + RULES.worthwhile) * of.rmse();
+        if conclusion.verdict == Verdict::EffectMissing
+            && as_good(&conclusion.model.judged)
+            && !self.first_is_certified(&conclusion.model, &way, &compared.others, &found)
+        {
+            conclusion = concluded(&found.bare);
+            way = self.way(&conclusion, &found.root);
+        }
         let Conclusion {
             verdict,
             model: last,
@@ -275,6 +284,23 @@ impl Session<'_> {
             base: units.model_out(&judge.final_fit(&found.bare.judged).model),
             model,
         }
+    }
+
+    /// Whether the most important effect has a certificate.
+    fn first_is_certified(
+        &self,
+        model: &Hypothesis,
+        way: &Way,
+        others: &[Rival],
+        found: &Found,
+    ) -> bool {
+        let sets = self.sets(model, &way.order, way.proven, others, &found.root);
+        let certificates = self.certificates(model, &sets, others, found);
+        let first = way
+            .order
+            .first()
+            .and_then(|spec| certificates.get(spec.name));
+        first.is_none_or(Certificate::holds)
     }
 
     /// The effect that lowers the error of `hypothesis` the least, and the hypothesis refitted without it.

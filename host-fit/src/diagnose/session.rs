@@ -9,6 +9,7 @@ use super::ranking::{Rival, not_tried, rivals};
 use super::{DiagnoseError, Diagnosis, Options, RULES, Rung, Verdict};
 use crate::model::Model;
 use crate::parallel;
+use crate::residual::NoiseSource;
 use crate::terms::{
     Found, HeldOut, Hypothesis, Judge, Judged, Likelihood, Search, Term, Units, p_value,
 };
@@ -132,7 +133,12 @@ impl Session<'_> {
             && as_good(&conclusion.model.judged)
             && !self.first_is_certified(&conclusion.model, &way, &compared.others, &found)
         {
+            let explained =
+                self.fits(&conclusion.model.judged) || judge.noise_source == NoiseSource::Scatter;
             conclusion = concluded(&found.bare);
+            if explained {
+                conclusion.verdict = Verdict::NothingMissing;
+            }
             way = self.way(&conclusion, &found.root);
         }
         let Conclusion {

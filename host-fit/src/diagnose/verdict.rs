@@ -11,7 +11,7 @@ use model_core::effect::Spec;
 
 impl Session<'_> {
     /// Whether an error is at the noise level, within its uncertainty.
-    fn fits(&self, judged: &Judged) -> bool {
+    pub(super) fn fits(&self, judged: &Judged) -> bool {
         let judge = self.judge();
         self.is_at_noise(&judged.held_out)
             || (judge.noise_source == NoiseSource::Scatter

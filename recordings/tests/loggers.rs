@@ -480,7 +480,11 @@ fn a_sample_may_be_the_mean_of_several_rows() {
     assert!((set.sample_period_s - 0.3).abs() < 1e-12 && (record.t0 - 0.1).abs() < 1e-12);
     // The command of a sample is that of most of its rows.
     assert_eq!(mean(2).unwrap().set.records[0].u, [0.0, 1.0, 1.0]);
-    for (rows_of, says) in [(1, "2 or more"), (4, "at least twice as many rows")] {
+    for (rows_of, says) in [
+        (1, "2 or more"),
+        (4, "at least twice as many rows"),
+        (usize::MAX / 2 + 1, "at least twice as many rows"),
+    ] {
         let error = mean(rows_of).unwrap_err().to_string();
         assert!(error.contains(says), "{error}");
     }

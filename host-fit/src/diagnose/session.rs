@@ -128,9 +128,9 @@ impl Session<'_> {
             }
         };
         // If no effect has a certificate and the given model is as good without them, the given model is the answer.
-        let as_good = |of: &Judged| self.as_given.rmse() <= (1.0 + RULES.worthwhile) * of.rmse();
+        let as_good = (1.0 + RULES.worthwhile) * conclusion.model.judged.rmse();
         if conclusion.verdict == Verdict::EffectMissing
-            && as_good(&conclusion.model.judged)
+            && self.as_given.rmse() <= as_good
             && !self.first_is_certified(&conclusion.model, &way, &compared.others, &found)
         {
             let explained =

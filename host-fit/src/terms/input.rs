@@ -129,12 +129,30 @@ fn channels_that_vary(records: &[Record]) -> Vec<Channel<'_>> {
     varying.collect()
 }
 
-/// The channel's name in that of an effect.
-fn in_a_name(channel: &str) -> String {
-    let words = channel.to_lowercase();
+/// The tool's own effect `prefix-CHANNEL` on the reading; `what` precedes the channel in its summary, and `body` is the
+/// expression with states and parameters. `None` if the name is too long for an effect.
+fn of_channel(
+    prefix: &str,
+    channel: &Channel<'_>,
+    [what, source]: [&str; 2],
+    body: &str,
+) -> Option<&'static Definition> {
+    let words = channel.name.to_lowercase();
     let words = words.split(|c: char| !c.is_ascii_alphanumeric());
     let words: Vec<&str> = words.filter(|word| !word.is_empty()).collect();
-    words.join("-")
+    let name = words.join("-");
+    let summary = format!("{what} the measured channel `{}`", channel.name);
+    let [quoted, summary] = [channel.name.to_owned(), summary].map(toml::Value::String);
+    let text = format!(
+        r#"name = "{prefix}-{name}"
+place = "sensor"
+summary = {summary}
+source = "{source}"
+channel = {quoted}
+scales = true
+{body}"#
+    );
+    Definition::from_toml(&text, channel.name).ok()
 }
 
 /// The reading as a multiple of a linear function of the channel, beginning at the reading that does not depend on it.
@@ -142,20 +160,9 @@ fn scaled_by(channel: &Channel<'_>) -> Option<&'static Definition> {
     if channel.low * channel.high <= 0.0 {
         return None;
     }
-    let (name, signal) = (in_a_name(channel.name), channel_signal(channel.name));
-    let summary = format!(
-        "the reading scales with the measured channel `{}`",
-        channel.name
-    );
-    let [quoted, summary] = [channel.name.to_owned(), summary].map(toml::Value::String);
-    let text = format!(
-        r#"name = "scaled-by-{name}"
-place = "sensor"
-summary = {summary}
-source = "calibration: to first order the sensitivity is a linear function of the channel"
-channel = {quoted}
-scales = true
-expression = "reading + gain * ({signal} / reference - 1.0) * (reading - zero)"
+    let signal = channel_signal(channel.name);
+    let body = format!(
+        r#"expression = "reading + gain * ({signal} / reference - 1.0) * (reading - zero)"
 [[parameter]]
 name = "gain"
 unit = "-"
@@ -170,24 +177,19 @@ high = 100.0
 starts = [0.0, -2.0]
 "#
     );
-    // A name that is too long is not valid for an effect.
-    Definition::from_toml(&text, channel.name).ok()
+    let texts = [
+        "the reading scales with",
+        "calibration: to first order the sensitivity is a linear function of the channel",
+    ];
+    of_channel("scaled-by", channel, texts, &body)
 }
 
 /// The response to the channel.
 fn measured_input(channel: &Channel<'_>) -> Option<&'static Definition> {
-    let (name, signal) = (in_a_name(channel.name), channel_signal(channel.name));
+    let signal = channel_signal(channel.name);
     let range = channel.high - channel.low;
-    let summary = format!("a response of y to the measured channel `{}`", channel.name);
-    let [quoted, summary] = [channel.name.to_owned(), summary].map(toml::Value::String);
-    let text = format!(
-        r#"name = "input-{name}"
-place = "sensor"
-summary = {summary}
-source = "superposition: a measured disturbance behind a first-order lag with dead time"
-channel = {quoted}
-scales = true
-expression = "reading + gain * level"
+    let body = format!(
+        r#"expression = "reading + gain * level"
 [[state]]
 name = "first"
 update = "if begun > 0.5 {{ first }} else {{ {signal} }}"
@@ -218,8 +220,11 @@ high = 0.5
 starts = [0.0, 0.02, 0.08, 0.25]
 "#
     );
-    // A name that is too long is not valid for an effect.
-    Definition::from_toml(&text, channel.name).ok()
+    let texts = [
+        "a response of y to",
+        "superposition: a measured disturbance behind a first-order lag with dead time",
+    ];
+    of_channel("input", channel, texts, &body)
 }
 
 #[cfg(test)]

@@ -388,7 +388,7 @@ impl Mapping {
             ..origin
         };
         if let Some(rows) = self.mean_of {
-            if record.len() < 2 * rows {
+            if record.len() / 2 < rows {
                 let samples = record.len();
                 return Err(fault(ImportProblem::TooFewRows { rows, samples }));
             }

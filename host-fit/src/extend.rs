@@ -12,7 +12,7 @@ use crate::excitation::bears_little;
 use crate::fit::{CandidateError, channel_reference, fit_with_effect};
 use crate::model::Model;
 use crate::simulate::SimulateError;
-use crate::terms::{Bench, Hypothesis, Judged, Search};
+use crate::terms::{Bench, Hypothesis, Judged, Search, second_order};
 use model_core::effect::Spec;
 use strsim::levenshtein;
 use thiserror::Error;
@@ -132,12 +132,18 @@ pub fn extend(
     let lean = |frame: &Model| {
         let mut bare = frame.clone();
         bare.effects.retain(|added| !names.contains(&added.name));
-        let lean = search.root(&bare, bench.mid_run)?;
-        with_effects(lean.judged.model())
+        let first = search.root(&bare, bench.mid_run)?;
+        let second = second_order(judge, &first, !bare.delay.follows_y());
+        let first = with_effects(first.judged.model());
+        let second = second.and_then(|second| with_effects(second.judged.model()).ok());
+        match (first, second) {
+            (Ok(first), Some(second)) if second.size() < first.size() => Ok(second),
+            (first, _) => first,
+        }
     };
     progress("the given structure with the effects");
     let as_given = with_effects(given);
-    let searched = !bears_little(records) && !search.keeps_lags(given, bench.mid_run);
+    let searched = !bears_little(records);
     let as_lean = searched.then(|| {
         progress("the model with the fewest lags and the effects");
         lean(given)

@@ -73,7 +73,7 @@ pub(super) fn alone(judge: &Judge, frame: &Model) -> Option<Model> {
 
 /// A second order with the delay law and the products of `root`, which is of first order. A search that adds one
 /// term at a time finds it late, because the delay of the first-order model contains the second lag.
-pub(super) fn second_order(
+pub(crate) fn second_order(
     judge: &Judge,
     root: &Hypothesis,
     may_be_constant: bool,

@@ -48,7 +48,7 @@ pub(crate) use input::{leading_inputs, measured_inputs};
 pub(crate) use judge::size;
 pub use judge::{Judge, Judged};
 pub(crate) use likelihood::Likelihood;
-pub(crate) use linear::baselines;
+pub(crate) use linear::{baselines, second_order};
 pub use proposal::Proposal;
 pub(crate) use resampling::{is_out, shares_won};
 pub use rules::{RULES, Rules};

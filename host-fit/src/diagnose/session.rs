@@ -205,8 +205,9 @@ impl Session<'_> {
         let evident = order.iter().take(way.proven).take_while(holds).count();
         let is_known = |spec: &&&'static Spec| is_identified(&parameters[spec.name], spec);
         let known = order.iter().take_while(is_known).count();
+        let decided = decided(&order, last.judged.model());
         let proven = if claims {
-            evident.min(known).min(decided(&order, last.judged.model()))
+            evident.min(known).min(decided)
         } else {
             0
         };
@@ -249,6 +250,7 @@ impl Session<'_> {
         let separation = self.separation(&model, alternatives, separated);
         let mut missing: Vec<String> = order.iter().map(|spec| spec.name.to_owned()).collect();
         let stand_ins = missing.split_off(proven);
+        let decided: Vec<String> = stand_ins.iter().take(decided - proven).cloned().collect();
         sets.truncate(proven);
         let is_certified = |name: &String| {
             let spec = order.iter().find(|spec| spec.name == name.as_str());
@@ -256,7 +258,7 @@ impl Session<'_> {
             spec.is_some_and(|spec| is_identified(&parameters[spec.name], spec))
                 && certificate.is_some_and(Certificate::holds_beside_others)
         };
-        let certified = stand_ins
+        let certified = decided
             .iter()
             .filter(|_| verdict == Verdict::PartlyExplained);
         let certified = certified.filter(|name| is_certified(name));
@@ -309,17 +311,26 @@ impl Session<'_> {
         first.is_none_or(Certificate::holds)
     }
 
-    /// The effect that lowers the error of `hypothesis` the least, and the hypothesis refitted without it.
+    /// The effect that lowers the error of `hypothesis` the least, and the hypothesis refitted without it. A measured
+    /// channel is a cause on record: it goes after all effects that nobody measured.
     fn without_the_least(
         &self,
         hypothesis: &Hypothesis,
         root: &Hypothesis,
     ) -> Option<(&'static Spec, Hypothesis)> {
-        let without = |index: usize| {
-            let spec = hypothesis.terms[index].effect()?;
+        let effects = hypothesis.terms.iter().enumerate();
+        let effects = effects.filter_map(|(index, term)| Some((index, term.effect()?)));
+        let (measured, unmeasured): (Vec<_>, Vec<_>) =
+            effects.partition(|(_, spec)| is_of_a_channel(spec, hypothesis.judged.model()));
+        let open = if unmeasured.is_empty() {
+            measured
+        } else {
+            unmeasured
+        };
+        let without = |(index, spec): (usize, &'static Spec)| {
             Some((spec, self.search.without(hypothesis, index, root)?))
         };
-        let lesser = parallel::some(0..hypothesis.terms.len(), without);
+        let lesser = parallel::some(open, without);
         let size = |one: &(_, Hypothesis)| one.1.judged.rmse();
         lesser
             .into_iter()
@@ -390,14 +401,17 @@ impl Session<'_> {
 /// How many effects of `order` can be named. The base was identified without the measured channels that lead; what follows
 /// them is decided when it is identified with them.
 fn decided(order: &[&'static Spec], model: &Model) -> usize {
-    let of_channel = |spec: &&&'static Spec| {
-        let own = model.definition(spec.name);
-        own.is_some_and(Definition::is_of_a_channel)
-    };
-    match order.iter().take_while(of_channel).count() {
+    let leading = order.iter().take_while(|spec| is_of_a_channel(spec, model));
+    match leading.count() {
         0 => order.len(),
         leading => leading,
     }
+}
+
+/// Whether an effect is the tool's own for a measured channel.
+fn is_of_a_channel(spec: &Spec, model: &Model) -> bool {
+    let own = model.definition(spec.name);
+    own.is_some_and(Definition::is_of_a_channel)
 }
 
 #[cfg(test)]

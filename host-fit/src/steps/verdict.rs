@@ -140,9 +140,9 @@ fn finding(diagnosis: &Diagnosis, plant: Plant) -> Answer {
         let effects = names.iter().map(|name| format!(" --effect {name}"));
         let effects: String = effects.collect();
         // Further effects are judged on a base that was identified with the channels.
-        let command = match of_channels(diagnosis) && !diagnosis.stand_ins.is_empty() {
-            true => "identify DATASET",
-            false => "extend model.toml DATASET",
+        let command = match of_channels(diagnosis).is_empty() || diagnosis.stand_ins.is_empty() {
+            true => "extend model.toml DATASET",
+            false => "identify DATASET",
         };
         format!("host-fit {command}{effects} -o better.toml")
     };
@@ -200,7 +200,11 @@ fn finding(diagnosis: &Diagnosis, plant: Plant) -> Answer {
             let own = |name| diagnosis.certificates.get(name);
             let mut certificates = diagnosis.stand_ins.iter().filter_map(own);
             let unknown = |name: &String| !diagnosis.is_identified(name);
-            let why = if certificates.any(|one| one.evidence_nats < 0.0) {
+            let channels = of_channels(diagnosis);
+            let why = if !channels.is_empty() {
+                "the model was identified without the measured channel, and the cause is decided after it is identified \
+                 with the channel"
+            } else if certificates.any(|one| one.evidence_nats < 0.0) {
                 "there is more evidence for a model without them"
             } else if diagnosis.stand_ins.iter().any(unknown) {
                 "the records do not determine their parameters"
@@ -216,7 +220,10 @@ fn finding(diagnosis: &Diagnosis, plant: Plant) -> Answer {
                 .confidence(format!(
                     "Surrogates describe the error and are not claimed as its cause: {why}."
                 ))
-                .next(discover)
+                .next(match channels {
+                    [] => discover.to_owned(),
+                    channels => add(channels),
+                })
         }
         Verdict::Unexplained => {
             let tried = diagnosis.ladder.last().map(|rung| joined(&named(&rung.effects, plant)));
@@ -318,13 +325,19 @@ fn missing(names: &[String], sets: &[Vec<String>]) -> String {
     }
 }
 
-/// Whether all named effects are the tool's own for measured channels.
-fn of_channels(diagnosis: &Diagnosis) -> bool {
-    let mut own = diagnosis
-        .missing
-        .iter()
-        .map(|name| diagnosis.model.definition(name));
-    !diagnosis.missing.is_empty() && own.all(|own| own.is_some_and(Definition::is_of_a_channel))
+/// The tool's own effects of measured channels, if they lead: other effects are decided on a base that was identified
+/// with them.
+fn of_channels(diagnosis: &Diagnosis) -> &[String] {
+    let all = match diagnosis.missing.is_empty() {
+        true => &diagnosis.stand_ins,
+        false => &diagnosis.missing,
+    };
+    let is_of_a_channel = |name: &String| {
+        let own = diagnosis.model.definition(name);
+        own.is_some_and(Definition::is_of_a_channel)
+    };
+    let leading = all.iter().take_while(|name| is_of_a_channel(name)).count();
+    &all[..leading]
 }
 
 /// Surrogates in addition to named effects.
@@ -338,10 +351,10 @@ fn surrogates(answer: &mut Answer, diagnosis: &Diagnosis, plant: Plant) {
         joined(&named(&diagnosis.stand_ins, plant)),
         if several { "are" } else { "is" },
         if several { "surrogates" } else { "a surrogate" },
-        match of_channels(diagnosis) {
-            true => "the model was identified without the measured channel, and what else is missing is decided after \
-                     it is identified with the channel",
-            false => "not significant together with the named effects, or not identifiable on these records",
+        match of_channels(diagnosis).is_empty() {
+            true => "not significant together with the named effects, or not identifiable on these records",
+            false => "the model was identified without the measured channel, and what else is missing is decided after \
+                      it is identified with the channel",
         }
     ));
 }

@@ -6,8 +6,10 @@ use super::ranking::Rival;
 use super::session::Session;
 use crate::model::Model;
 use crate::parallel;
+use crate::residual::NoiseSource;
 use crate::terms::{Found, Hypothesis, MostLikely, Term, log_e, p_of};
 use model_core::effect::Spec;
+use model_core::effects::NUISANCES;
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::PoisonError;
@@ -115,8 +117,13 @@ impl Session<'_> {
     }
 
     /// Whether the given model imitates the effects of `model`: it has none of these effects, but more parameters, and
-    /// less evidence.
+    /// less evidence. At an unknown noise level a model of first or second order imitates nothing: its second lag is the
+    /// simplest explanation, whose evidence is smaller only because the prior of a coefficient is wider than that of a
+    /// time constant.
     pub(super) fn given_imitates(&self, model: &Hypothesis) -> bool {
+        if self.judge().noise_source == NoiseSource::Scatter && is_of_second_order(self.given) {
+            return false;
+        }
         let names = model.terms.iter().filter_map(Term::effect);
         let names: Vec<&str> = names.map(|effect| effect.name).collect();
         let null = self.given_without(&names);
@@ -286,6 +293,13 @@ fn searched(model: &Model) -> usize {
     let lags = model.state_lags.iter().chain(&model.product_lags);
     let lags: BTreeSet<&u16> = lags.filter(|lag| **lag > 2).collect();
     count(model) + lags.len()
+}
+
+/// Whether a model is of first or second order, without effects and base terms other than those of the records' offsets.
+fn is_of_second_order(model: &Model) -> bool {
+    let mut lags = model.state_lags.iter().chain(&model.product_lags);
+    let is_nuisance = |name: &str| NUISANCES.iter().any(|spec| spec.name == name);
+    lags.all(|lag| *lag <= 2) && model.effects.iter().all(|added| is_nuisance(&added.name))
 }
 
 /// Number of coefficients and parameters of a model.

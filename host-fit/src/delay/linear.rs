@@ -8,8 +8,8 @@
 
 use super::plant::{Plant, Switching};
 use super::spread::mean;
-use super::white::without_outliers;
 use crate::data::Record;
+use crate::noise::without_outliers;
 use crate::order;
 use numerics::linalg::{dot, dots, gram, solve_symmetric};
 

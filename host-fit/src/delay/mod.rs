@@ -24,7 +24,6 @@ mod rules;
 mod spread;
 mod study;
 mod verdict;
-mod white;
 
 pub use dead_time::DeadTime;
 pub use drawing::draw_delays;

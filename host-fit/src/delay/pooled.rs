@@ -5,8 +5,8 @@ use super::dead_time::{DeadTime, correlation_of_neighbours, dead_time, widened_v
 use super::linear::{Free, Refined, Series, coarse, evaluate, fit, refine};
 use super::plant::Plant;
 use super::rules::RULES;
-use super::white::white_noise;
 use crate::data::Record;
+use crate::noise::white_noise;
 use numerics::linalg::dot;
 
 /// Samples of the refinement; longer records are decimated as far as the time constants allow.

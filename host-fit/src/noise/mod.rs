@@ -8,8 +8,10 @@
 
 mod colour;
 mod estimate;
+mod white;
 
 pub use colour::{Colour, Filter};
+pub(crate) use white::{white_noise, without_outliers};
 
 use numerics::linalg::{dot, dots};
 

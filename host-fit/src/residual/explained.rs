@@ -4,7 +4,6 @@ use super::binned::{Binned, Folds};
 use super::correlation::student;
 use super::rules::RULES;
 use numerics::linalg::dot;
-use statrs::distribution::{ContinuousCDF, Normal};
 use std::collections::BTreeMap;
 
 /// The error of a free run, record by record, with the variance of the noise.
@@ -151,19 +150,35 @@ impl Moments {
     }
 }
 
-/// The share of the unexplained variance that is a function of the coordinate; none if not significant.
-pub(super) fn explained(errors: &Errors, binned: &Binned, excess: f64) -> Option<Share> {
+/// The ways in which the error may depend on a coordinate.
+pub(super) fn ways(binned: &Binned, period_s: f64) -> Vec<Dependence> {
+    let is_slow = binned.coordinate.is_slow(period_s);
+    let with_dwell = binned.dwell.is_some();
+    [Dependence::Mean, Dependence::Size]
+        .into_iter()
+        .chain(is_slow.then_some(Dependence::Proportion))
+        .chain(with_dwell.then_some(Dependence::Dwell))
+        .collect()
+}
+
+/// The share of the unexplained variance that is a function of the coordinate; none if its p-value is not below `level`.
+pub(super) fn explained(
+    errors: &Errors,
+    binned: &Binned,
+    excess: f64,
+    level: f64,
+) -> Option<Share> {
     let samples = errors.samples(binned);
-    let by_y = gains(&samples, binned, excess, 0)?;
-    let mut ways = vec![(Dependence::Mean, by_y[0]), (Dependence::Size, by_y[2])];
-    if binned.coordinate.is_slow(errors.period_s) {
-        ways.push((Dependence::Proportion, by_y[1]));
-    }
-    if binned.dwell.is_some() {
-        ways.push((Dependence::Dwell, gains(&samples, binned, excess, 1)?[1]));
-    }
+    let gains = |covariate: usize| gains(&samples, binned, excess, level, covariate);
+    let by_y = gains(0)?;
     let mut best: Option<Share> = None;
-    for (dependence, gain) in ways {
+    for dependence in ways(binned, errors.period_s) {
+        let gain = match dependence {
+            Dependence::Mean => by_y[0],
+            Dependence::Proportion => by_y[1],
+            Dependence::Size => by_y[2],
+            Dependence::Dwell => gains(1)?[1],
+        };
         let fraction = gain / excess;
         if fraction > best.map_or(0.0, |b| b.fraction) {
             best = Some(Share {
@@ -181,6 +196,7 @@ fn gains(
     samples: &[JudgedSample],
     binned: &Binned,
     excess: f64,
+    level: f64,
     covariate: usize,
 ) -> Option<[f64; 3]> {
     let folds = samples.iter().map(|s| s.fold + 1).max()?;
@@ -211,7 +227,7 @@ fn gains(
         }
     }
     Some(match binned.folds {
-        Folds::Blocks => gains.map(|gains| beyond_chance(&gains, RULES.share_standard_errors)),
+        Folds::Blocks => gains.map(|gains| beyond_chance(&gains, level)),
         // A single event per record has no reproducible mean; the evidence is that it occurs at the same
         // place in most records.
         Folds::Records => {
@@ -226,7 +242,7 @@ fn gains(
             [0, 1, 2].map(|way| {
                 let agreeing = of_record.iter().filter(|record| record[way] > 0.0).count();
                 if agreeing as f64 >= RULES.agreeing_records * folds as f64 {
-                    beyond_chance(&gains[way], RULES.record_standard_errors)
+                    beyond_chance(&gains[way], RULES.record_level)
                 } else {
                     0.0
                 }
@@ -235,15 +251,15 @@ fn gains(
     })
 }
 
-/// The sum over independent blocks; 0 if it is not this many standard errors above 0, by Student's t. The standard
+/// The sum over independent blocks; 0 if the p-value of a sum above 0, by Student's t, is not below `level`. The standard
 /// deviation is that of all blocks: most blocks gain nothing, so a robust one would be too small.
-pub(super) fn beyond_chance(gains: &[f64], standard_errors: f64) -> f64 {
+pub(super) fn beyond_chance(gains: &[f64], level: f64) -> f64 {
     let n = gains.len() as f64;
     let sum: f64 = gains.iter().sum();
     let squares: f64 = gains.iter().map(|gain| (gain - sum / n).powi(2)).sum();
-    let error = (squares / (n - 1.0).max(1.0) / n).sqrt();
-    let level = Normal::standard().sf(standard_errors);
-    match student(sum / n, error, (n - 1.0).max(1.0)) < level {
+    let degrees = (n - 1.0).max(1.0);
+    let error = (squares / degrees / n).sqrt();
+    match student(sum / n, error, degrees) < level {
         true => sum,
         false => 0.0,
     }
@@ -306,8 +322,8 @@ impl Learned {
 mod tests {
     use super::*;
 
-    /// A sum of 2.7 standard errors exceeds the limit by the normal distribution, 2.5, but not Student's for ten
-    /// blocks, 3.1.
+    /// A sum of 2.7 standard errors has a p-value of 0.0035 by the normal distribution, and of 0.012 by Student's for ten
+    /// blocks.
     #[test]
     fn few_blocks_have_to_say_more() {
         // The sum is 2.7 standard errors above 0 for every n.
@@ -317,9 +333,9 @@ mod tests {
                 .map(|k| if k % 2 == 0 { 1.0 + apart } else { 1.0 - apart })
                 .collect()
         };
-        assert_eq!(beyond_chance(&gains(10), 2.5), 0.0);
-        assert!((beyond_chance(&gains(400), 2.5) - 400.0).abs() < 1e-9);
-        assert!(beyond_chance(&gains(10), 1.9) > 0.0);
+        assert_eq!(beyond_chance(&gains(10), 0.006), 0.0);
+        assert!((beyond_chance(&gains(400), 0.006) - 400.0).abs() < 1e-9);
+        assert!(beyond_chance(&gains(10), 0.03) > 0.0);
     }
 
     /// Three large errors that happen to lie in one bin: every other block gains nothing, and the sum is 1.7 standard
@@ -330,6 +346,6 @@ mod tests {
         gains[10] = 5.0;
         gains[40] = 4.0;
         gains[70] = 6.0;
-        assert_eq!(beyond_chance(&gains, 2.5), 0.0);
+        assert_eq!(beyond_chance(&gains, 0.006), 0.0);
     }
 }

@@ -28,7 +28,7 @@ use crate::order;
 use crate::picture::{FailureBin, FailureView};
 use crate::simulate::SimulateError;
 use binned::{Binned, Source, coordinates};
-use explained::{Errors, explained};
+use explained::{Errors, explained, ways};
 use serde::Serialize;
 
 /// The error along one coordinate. Serialises to the keys of `compare --json`.
@@ -171,8 +171,14 @@ pub fn examine(records: &[&Record], simulated: Vec<Vec<f64>>, delay: usize) -> F
     let excess = errors.excess().max(f64::MIN_POSITIVE);
     let mut by: Vec<Where> = Vec::new();
     let mut cycles: Vec<Where> = Vec::new();
-    for binned in coordinates(&source) {
-        let found = along(&errors, &binned, excess, above_noise);
+    let all = coordinates(&source);
+    let tests: usize = all
+        .iter()
+        .map(|binned| ways(binned, errors.period_s).len())
+        .sum();
+    let level = RULES.share_level / tests.max(1) as f64;
+    for binned in all {
+        let found = along(&errors, &binned, excess, above_noise.then_some(level));
         if found.coordinate.is_cycle() {
             cycles.push(found);
         } else {
@@ -275,7 +281,8 @@ impl Tally {
     }
 }
 
-fn along(errors: &Errors, binned: &Binned, excess: f64, above_noise: bool) -> Where {
+/// The error along a coordinate; its share at this `level`, if the error is above the noise.
+fn along(errors: &Errors, binned: &Binned, excess: f64, level: Option<f64>) -> Where {
     let mut tallies = vec![Tally::default(); binned.ranges.len()];
     let mut samples = 0.0;
     for (record, bins) in binned.bin.iter().enumerate() {
@@ -291,11 +298,7 @@ fn along(errors: &Errors, binned: &Binned, excess: f64, above_noise: bool) -> Wh
             }
         }
     }
-    let share = if above_noise {
-        explained(errors, binned, excess)
-    } else {
-        None
-    };
+    let share = level.and_then(|level| explained(errors, binned, excess, level));
     let bins = binned
         .ranges
         .iter()
@@ -316,8 +319,8 @@ fn along(errors: &Errors, binned: &Binned, excess: f64, above_noise: bool) -> Wh
         worst_rmse: worst.rms(worst.square),
         bias: worst.error / worst.count.max(1.0),
         dependence: share.map(|s| s.dependence),
-        concentration: above_noise
-            .then(|| concentration(&tallies, &binned.ranges, excess, samples))
+        concentration: level
+            .map(|_| concentration(&tallies, &binned.ranges, excess, samples))
             .flatten(),
         trend: None,
         bins,

@@ -22,12 +22,10 @@ rules! {
     plenty: usize = 4000, "values", "judgement: limits the time";
     /// Number of cross-validation folds over blocks.
     turns: usize = 5, "", "convention of cross-validation";
-    /// A coordinate's share must be this many standard errors above 0: about ten coordinates are tested in
-    /// three ways each.
-    share_standard_errors: f64 = 2.5, "standard errors", "limits false alarms over thirty tests; tested in `pure_noise_explains_nothing`";
-    /// Required standard errors above 0 with folds over whole records; lower, because a single event per record has no
-    /// reproducible mean.
-    record_standard_errors: f64 = 1.0, "standard errors", "judgement";
+    /// Family-wise level of the shares of all coordinates: each is tested in two to four ways.
+    share_level: f64 = 0.05, "family-wise p-value", "convention; tested in `pure_noise_explains_nothing`";
+    /// Level of a share with folds over whole records; higher, because a single event per record has no reproducible mean.
+    record_level: f64 = 0.16, "p-value", "judgement: one standard error";
     /// For folds over whole records, the error must also occur at the same place in this share of the
     /// records.
     agreeing_records: f64 = 2.0 / 3.0, "share of the records", "judgement";
@@ -62,8 +60,8 @@ rules! {
     piece: usize = 1024, "samples", "judgement: the longest lags are half as long";
     /// Smallest number of segments of a spectrum.
     fewest_pieces: usize = 6, "", "three for training and three for testing";
-    /// A band's spectrum must exceed that of the noise by this many standard errors.
-    band_standard_errors: f64 = 3.0, "standard errors", "convention; tested in `pure_noise_explains_nothing`";
+    /// Level at which a band's spectrum must exceed that of the noise.
+    band_level: f64 = 0.001, "p-value", "convention; tested in `pure_noise_explains_nothing`";
 
     /// Level of the test for a trend from edge to edge.
     trend_level: f64 = 0.002, "p-value", "1 % over about five tests";

@@ -86,8 +86,7 @@ pub(super) fn by_frequency(errors: &Errors, excess: f64) -> Option<Where> {
     // y_sd does not give the colour of the noise: a band's share counts only in proportion to the unexplained
     // variance.
     let known = excess / (excess + noise);
-    let fraction =
-        known * super::explained::beyond_chance(&gains, RULES.band_standard_errors) / excess;
+    let fraction = known * super::explained::beyond_chance(&gains, RULES.band_level) / excess;
     let hz = |line: f64| line / (length as f64 * errors.period_s);
     let n = (pieces.len() * length) as f64;
     let bins: Vec<FailureBin> = (0..bands)

@@ -6,6 +6,7 @@ use super::folds::{Fold, HeldOutBy, Judging, folds};
 use crate::data::{Record, Use};
 use crate::fit::{Fit, FitOptions, LevelScatter, fit, pieces_of};
 use crate::model::Model;
+use crate::noise::without_outliers;
 use crate::parallel;
 use crate::residual::{NoiseSource, noise_floor};
 use crate::simulate::SimulateError;
@@ -344,16 +345,26 @@ impl Judge {
         }
     }
 
-    /// Mean square validation error over the variance of y in all records. The validation samples alone may be at rest, as
-    /// at the end of a step test.
+    /// Mean square validation error over the variance of y in all records, both without single wrong readings, which are
+    /// no motion. The validation samples alone may be at rest, as at the end of a step test.
     pub(crate) fn error_of_motion(&self, held_out: &HeldOut) -> f64 {
         let all = self.first_fold();
-        let ys = || all.iter().flat_map(|record| &record.y);
-        let samples = ys().count().max(1) as f64;
-        let mean = ys().sum::<f64>() / samples;
-        let variance = ys().map(|y| (y - mean).powi(2)).sum::<f64>() / samples;
+        let read: Vec<f64> = all
+            .iter()
+            .flat_map(|record| without_outliers(&record.y))
+            .collect();
+        let samples = read.len().max(1) as f64;
+        let mean = read.iter().sum::<f64>() / samples;
+        let variance = read.iter().map(|y| (y - mean).powi(2)).sum::<f64>() / samples;
+        let errors: Vec<f64> = held_out
+            .errors
+            .iter()
+            .flat_map(|e| without_outliers(e))
+            .collect();
+        // The part along the level's scatter is motion as well.
+        let scatter = held_out.measured - held_out.sum_of_squares;
         if variance > 0.0 {
-            held_out.measured_rmse().powi(2) / variance
+            (dot(&errors, &errors) + scatter) / errors.len().max(1) as f64 / variance
         } else {
             1.0
         }

@@ -6,7 +6,7 @@ use super::session::Session;
 use super::{RULES, Verdict};
 use crate::parallel;
 use crate::residual::{FailureCoordinate, NoiseSource, examine};
-use crate::terms::{Found, HeldOut, Hypothesis, Judged, Likelihood, RULES as TERMS, Search, Term};
+use crate::terms::{Found, HeldOut, HeldOutBy, Hypothesis, Judged, Likelihood, RULES as TERMS, Search, Term};
 use model_core::effect::Spec;
 
 impl Session<'_> {
@@ -46,15 +46,22 @@ impl Session<'_> {
         })
     }
 
-    /// Whether the validation error is a function of any coordinate other than its own frequency.
+    /// Whether the error is a function of any coordinate other than its own frequency. Where there are validation
+    /// records, estimation records count as well: a few validation records show no dependence.
     fn depends(&self, judged: &Judged) -> bool {
+        let judge = self.judge();
         let (mut records, mut runs) = (Vec::new(), Vec::new());
-        for (fold, fit) in self.judge().folds.iter().zip(&judged.fits) {
-            for judging in &fold.judging {
-                let Ok(run) = fit.model.free_run(&judging.record) else {
+        for (fold, fit) in judge.folds.iter().zip(&judged.fits) {
+            let judging = fold.judging.iter().map(|judging| &judging.record);
+            let learning = fold
+                .learning
+                .iter()
+                .filter(|_| judge.held_out_by == HeldOutBy::Records);
+            for record in judging.chain(learning) {
+                let Ok(run) = fit.model.free_run(record) else {
                     return true;
                 };
-                records.push(&judging.record);
+                records.push(record);
                 runs.push(run);
             }
         }

@@ -25,7 +25,7 @@ pub(super) struct Session<'a> {
     pub(super) options: &'a Options,
     /// The given model.
     pub(super) given: &'a Model,
-    /// Validation error of the given model.
+    /// Validation error of the given model, or of its structure, as far as comparable with a hypothesis.
     pub(super) as_given: &'a HeldOut,
     /// ln of the evidence of models, nats, for those models that were compared so far.
     pub(super) evidences: Mutex<Vec<(Model, Option<f64>)>>,

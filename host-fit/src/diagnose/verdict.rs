@@ -6,7 +6,9 @@ use super::session::Session;
 use super::{RULES, Verdict};
 use crate::parallel;
 use crate::residual::{FailureCoordinate, NoiseSource, examine};
-use crate::terms::{Found, HeldOut, HeldOutBy, Hypothesis, Judged, Likelihood, RULES as TERMS, Search, Term};
+use crate::terms::{
+    Found, HeldOut, HeldOutBy, Hypothesis, Judged, Likelihood, RULES as TERMS, Search, Term,
+};
 use model_core::effect::Spec;
 
 impl Session<'_> {

@@ -18,6 +18,7 @@ use crate::identify::{
 };
 use crate::indicators::{Scores, one_step_norm, score, score_new};
 use crate::model::{Delay, Model, Start};
+use crate::noise::without_outliers;
 use crate::preparation::Preparation;
 use crate::search::{Settings, StopReason};
 use crate::terms::{Frame, Units, base_model, baselines, measured_inputs};
@@ -315,6 +316,23 @@ fn overfitted(scores: &Scores, model: &Model) -> Option<String> {
     })
 }
 
+/// The remark on single wrong readings, if they lower the FIT of the model by more than a point.
+fn wrong_readings(model: &Model, records: &[Record], scores: &Scores) -> Option<String> {
+    let mut count = 0;
+    let mut cleaned = records.to_vec();
+    for record in &mut cleaned {
+        let y = without_outliers(&record.y);
+        count += y.iter().zip(&record.y).filter(|(a, b)| a != b).count();
+        record.y = y;
+    }
+    let without = (count > 0).then(|| score(model, &cleaned).ok())??.0;
+    let [with, without] = [scores, &without].map(|scores| finite_fit(scores.held_out()));
+    let without = without.filter(|without| *without > with.unwrap_or(f64::NAN) + 1.0)?;
+    Some(format!(
+        "{count} readings of y are wrong: each is far from both neighbours. Without them the FIT is {without:.1} %."
+    ))
+}
+
 /// Identifies a model on the identify records of `set`. The delays are found by search, and for each candidate the
 /// coefficients by least squares. If the objective is the free run, the coefficients are refined on it, and kept
 /// if the validation error falls.
@@ -476,6 +494,7 @@ fn with_effects(
         return Err(StepError::Unstable(diverged));
     }
     remarks.extend(overfitted(&scores, &model));
+    remarks.extend(wrong_readings(&model, records, &scores));
     let beside = Beside::of(records);
     let fit = scores.held_out().map_or(f64::NAN, |all| all.fit_percent);
     remarks.extend(beside.better_than(fit));

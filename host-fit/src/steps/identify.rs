@@ -595,3 +595,27 @@ fn automatic(
         model,
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::residual::plants::{base, records};
+
+    #[test]
+    fn wrong_readings_are_counted_and_the_fit_is_stated_without_them() {
+        let mut records = records(&[], &[], 1);
+        let model = base(&records);
+        let remark = |records: &[Record]| {
+            let (scores, _) = score(&model, records).expect("stable");
+            wrong_readings(&model, records, &scores)
+        };
+        assert_eq!(remark(&records), None);
+        let middle = records[0].len() / 2;
+        for record in &mut records {
+            record.y[middle] += 20.0;
+        }
+        let remark = remark(&records).expect("wrong readings");
+        let count = format!("{} readings of y are wrong", records.len());
+        assert!(remark.starts_with(&count), "{remark}");
+    }
+}

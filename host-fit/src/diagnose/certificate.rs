@@ -150,7 +150,7 @@ impl Session<'_> {
         }
         Some(Null {
             evidence: self.evidence_of(self.given)?,
-            excess: self.judge().excess(self.as_given),
+            excess: self.judge().excess(self.as_structured),
             parameters: searched(self.given),
         })
     }
@@ -295,11 +295,13 @@ fn searched(model: &Model) -> usize {
     count(model) + lags.len()
 }
 
-/// Whether a model is of first or second order, without effects and base terms other than those of the records' offsets.
+/// Whether a model is of first or second order, with at most two products, and without effects and base terms other than
+/// those of the records' offsets.
 fn is_of_second_order(model: &Model) -> bool {
-    let mut lags = model.state_lags.iter().chain(&model.product_lags);
     let is_nuisance = |name: &str| NUISANCES.iter().any(|spec| spec.name == name);
-    lags.all(|lag| *lag <= 2) && model.effects.iter().all(|added| is_nuisance(&added.name))
+    model.state_lags.iter().all(|lag| *lag <= 2)
+        && model.product_lags.len() <= 2
+        && model.effects.iter().all(|added| is_nuisance(&added.name))
 }
 
 /// Number of coefficients and parameters of a model.

@@ -124,12 +124,10 @@ fn chosen(
     };
     progress("the model as given");
     let as_given = judge.held_out(|_| &given_inside)?;
-    // Where the validation samples are part of the estimation records, the given model was fitted to them. Only its
-    // structure, refitted without them, is comparable with a hypothesis.
     let refitted = (judge.held_out_by != HeldOutBy::Records)
         .then(|| judge.refitted(&given_inside).ok())
         .flatten();
-    let comparable = refitted
+    let as_structured = refitted
         .map(|refitted| refitted.held_out)
         .filter(|held_out| held_out.rmse() > as_given.rmse())
         .unwrap_or_else(|| as_given.clone());
@@ -138,7 +136,8 @@ fn chosen(
         units,
         options,
         given: &given_inside,
-        as_given: &comparable,
+        as_given: &as_given,
+        as_structured: &as_structured,
         evidences: Mutex::default(),
     };
     let first = Rung::of(

@@ -25,8 +25,11 @@ pub(super) struct Session<'a> {
     pub(super) options: &'a Options,
     /// The given model.
     pub(super) given: &'a Model,
-    /// Validation error of the given model, or of its structure, as far as comparable with a hypothesis.
+    /// Validation error of the given model.
     pub(super) as_given: &'a HeldOut,
+    /// Validation error of its structure. Where the validation samples are part of the estimation records, the given model
+    /// was fitted to them, and its structure is refitted without them, as every hypothesis is.
+    pub(super) as_structured: &'a HeldOut,
     /// ln of the evidence of models, nats, for those models that were compared so far.
     pub(super) evidences: Mutex<Vec<(Model, Option<f64>)>>,
 }
@@ -128,9 +131,9 @@ impl Session<'_> {
             }
         };
         // If no effect has a certificate and the given model is as good without them, the given model is the answer.
-        let as_good = (1.0 + RULES.worthwhile) * conclusion.model.judged.rmse();
         if conclusion.verdict == Verdict::EffectMissing
-            && self.as_given.rmse() <= as_good
+            && self.as_given.rmse()
+                <= (1.0 + RULES.worthwhile) * self.error_as_given(&conclusion.model)
             && !self.first_is_certified(&conclusion.model, &way, &compared.others, &found)
         {
             let explained =
@@ -478,6 +481,7 @@ mod tests {
             options: &options,
             given: &bench.given,
             as_given,
+            as_structured: as_given,
             evidences: Mutex::default(),
         };
         let as_given = &bare.judged.held_out;

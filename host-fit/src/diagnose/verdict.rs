@@ -188,6 +188,18 @@ impl Session<'_> {
         (found.judged.rmse() <= enough && !found.reaches_a_bound()).then_some(found)
     }
 
+    /// The error of a hypothesis on the validation samples, fitted as the given model was: to these as well where they are
+    /// part of the estimation records.
+    pub(super) fn error_as_given(&self, of: &Hypothesis) -> f64 {
+        let judge = self.judge();
+        if judge.held_out_by == HeldOutBy::Records {
+            return of.judged.rmse();
+        }
+        let end = judge.final_fit(&of.judged);
+        let fitted = judge.held_out(|_| &end.model);
+        fitted.map_or_else(|_| of.judged.rmse(), |fitted| fitted.rmse())
+    }
+
     /// The verdict on `best` compared with the best model without effects, which may be the given one.
     pub(super) fn concluded(&self, best: &Hypothesis, found: &Found) -> Conclusion {
         let (bare, as_given) = (&found.bare, self.as_given);
@@ -213,7 +225,7 @@ impl Session<'_> {
             NoiseSource::Scatter => RULES.worthwhile,
             NoiseSource::Measured | NoiseSource::Repeats => 0.0,
         };
-        let no_better = (1.0 + margin) * best.judged.rmse() >= as_given.rmse();
+        let no_better = (1.0 + margin) * self.error_as_given(best) >= as_given.rmse();
         if effects.is_empty() || (no_better && !self.given_imitates(best)) {
             return of_bare();
         }
@@ -227,9 +239,10 @@ impl Session<'_> {
         // Above the noise level, an effect is missing if it explains most of the unexplained variance of the reference
         // model. The reference is the given model; it is the best model without effects if that has a smaller error or
         // if the given model imitates the effect.
-        let is_reference = as_given.rmse() < bare.judged.rmse() && !self.given_imitates(best);
+        let as_structured = self.as_structured;
+        let is_reference = as_structured.rmse() < bare.judged.rmse() && !self.given_imitates(best);
         let without = match is_reference {
-            true => as_given,
+            true => as_structured,
             false => &bare.judged.held_out,
         };
         let taken = 1.0

@@ -29,8 +29,8 @@ pub(super) struct Drawn {
     pub(super) dead_time: Option<f64>,
     /// The channel that drives y as well.
     pub(super) input: Option<&'static str>,
-    /// Whether y contains a disturbance that no effect describes. The verdict "unexplained" is then
-    /// also right.
+    /// Whether y contains a disturbance that no effect describes. The verdicts "unexplained" and, without a name,
+    /// "partly-explained" are then also right.
     pub(super) disturbed: bool,
     /// Further options of `import`.
     pub(super) import: Vec<String>,

@@ -65,7 +65,10 @@ fn write(set: &Path, what: &str, drawn: &Drawn, logger: &Logger) -> Result<()> {
             "verdicts = [\"effect-missing\"]\nnames = [\"input-{name}\"]"
         )?,
         None if drawn.disturbed => {
-            writeln!(text, "verdicts = [\"nothing-missing\", \"unexplained\", \"partly-explained\"]")?;
+            writeln!(
+                text,
+                "verdicts = [\"nothing-missing\", \"unexplained\", \"partly-explained\"]"
+            )?;
         }
         None => writeln!(text, "verdicts = [\"nothing-missing\"]")?,
     }

@@ -356,6 +356,7 @@ mod tests {
                 options: &Options::default(),
                 given: given.judged.model(),
                 as_given: &given.judged.held_out,
+                as_structured: &given.judged.held_out,
                 evidences: Mutex::default(),
             };
             session.given_imitates(model)

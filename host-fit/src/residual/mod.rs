@@ -319,9 +319,7 @@ fn along(errors: &Errors, binned: &Binned, excess: f64, level: Option<f64>) -> W
         worst_rmse: worst.rms(worst.square),
         bias: worst.error / worst.count.max(1.0),
         dependence: share.map(|s| s.dependence),
-        concentration: level
-            .map(|_| concentration(&tallies, &binned.ranges, excess, samples))
-            .flatten(),
+        concentration: level.and_then(|_| concentration(&tallies, &binned.ranges, excess, samples)),
         trend: None,
         bins,
     }

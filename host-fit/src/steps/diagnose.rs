@@ -261,8 +261,14 @@ fn as_written(diagnosis: &mut Diagnosis, given: &Model, records: &[Record]) -> O
         && diagnosis.model != *given
         && (last.is_nan() || last > first.validate_rmse)
     {
+        // Effects that do not lower the error of the given model explain nothing. Something is missing only if that
+        // model is above the noise.
+        let fits = |noise: f64| first.validate_rmse <= DIAGNOSE.floor_margin * noise;
         if !diagnosis.missing.is_empty() || !diagnosis.stand_ins.is_empty() {
-            diagnosis.verdict = Verdict::Unexplained;
+            diagnosis.verdict = match first.noise_rmse.is_some_and(fits) {
+                true => Verdict::NothingMissing,
+                false => Verdict::Unexplained,
+            };
         }
         diagnosis.missing.clear();
         diagnosis.stand_ins.clear();

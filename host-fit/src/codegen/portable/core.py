@@ -39,7 +39,7 @@ def _push(line, value, length):
 #:_ago
 def _ago(line, samples):
     """The value `samples` samples ago, with linear interpolation."""
-    samples = max(samples, 0.0)
+    samples = min(max(0.0, samples), len(line) - 2.0)
     whole = int(samples)
     return line[-1 - whole] + (samples - whole) * (line[-2 - whole] - line[-1 - whole])
 

@@ -78,7 +78,7 @@ class Model:
         @delay@
         nearest = JETS
         @for inputs
-        exact = max(@factor@ * delay, 0.0)
+        exact = min(max(0.0, @factor@ * delay), 1e9)
         whole = min(int(exact), JETS - 2)
         @if rounded
         if exact - whole >= 0.5:

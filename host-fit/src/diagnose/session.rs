@@ -13,7 +13,6 @@ use crate::residual::NoiseSource;
 use crate::terms::{
     Found, HeldOut, Hypothesis, Judge, Judged, Likelihood, Search, Term, Units, p_value,
 };
-use crate::user_effect::Definition;
 use model_core::effect::Spec;
 use std::collections::BTreeMap;
 use std::sync::Mutex;
@@ -253,7 +252,6 @@ impl Session<'_> {
         let separation = self.separation(&model, alternatives, separated);
         let mut missing: Vec<String> = order.iter().map(|spec| spec.name.to_owned()).collect();
         let stand_ins = missing.split_off(proven);
-        let decided: Vec<String> = stand_ins.iter().take(decided - proven).cloned().collect();
         sets.truncate(proven);
         let is_certified = |name: &String| {
             let spec = order.iter().find(|spec| spec.name == name.as_str());
@@ -261,8 +259,9 @@ impl Session<'_> {
             spec.is_some_and(|spec| is_identified(&parameters[spec.name], spec))
                 && certificate.is_some_and(Certificate::holds_beside_others)
         };
-        let certified = decided
+        let certified = stand_ins
             .iter()
+            .take(decided - proven)
             .filter(|_| verdict == Verdict::PartlyExplained);
         let certified = certified.filter(|name| is_certified(name));
         let certified: Vec<String> = certified.cloned().collect();
@@ -321,10 +320,11 @@ impl Session<'_> {
         hypothesis: &Hypothesis,
         root: &Hypothesis,
     ) -> Option<(&'static Spec, Hypothesis)> {
+        let model = hypothesis.judged.model();
         let effects = hypothesis.terms.iter().enumerate();
         let effects = effects.filter_map(|(index, term)| Some((index, term.effect()?)));
         let (measured, unmeasured): (Vec<_>, Vec<_>) =
-            effects.partition(|(_, spec)| is_of_a_channel(spec, hypothesis.judged.model()));
+            effects.partition(|(_, spec)| model.is_of_a_channel(spec.name));
         let open = if unmeasured.is_empty() {
             measured
         } else {
@@ -404,17 +404,11 @@ impl Session<'_> {
 /// How many effects of `order` can be named. The base was identified without the measured channels that lead; what follows
 /// them is decided when it is identified with them.
 fn decided(order: &[&'static Spec], model: &Model) -> usize {
-    let leading = order.iter().take_while(|spec| is_of_a_channel(spec, model));
-    match leading.count() {
+    let of_a_channel = |spec: &&&Spec| model.is_of_a_channel(spec.name);
+    match order.iter().take_while(of_a_channel).count() {
         0 => order.len(),
         leading => leading,
     }
-}
-
-/// Whether an effect is the tool's own for a measured channel.
-fn is_of_a_channel(spec: &Spec, model: &Model) -> bool {
-    let own = model.definition(spec.name);
-    own.is_some_and(Definition::is_of_a_channel)
 }
 
 #[cfg(test)]

@@ -245,6 +245,12 @@ impl Model {
         own.find(|definition| definition.spec().name == name)
     }
 
+    /// Whether the effect called `name` is the tool's own for a measured channel.
+    pub(crate) fn is_of_a_channel(&self, name: &str) -> bool {
+        let own = self.definition(name);
+        own.is_some_and(Definition::is_of_a_channel)
+    }
+
     /// Makes a user effect available to the model. It replaces an effect with the same name, unless the model uses that
     /// effect.
     ///

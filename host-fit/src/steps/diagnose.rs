@@ -261,14 +261,8 @@ fn as_written(diagnosis: &mut Diagnosis, given: &Model, records: &[Record]) -> O
         && diagnosis.model != *given
         && (last.is_nan() || last > first.validate_rmse)
     {
-        // Effects that do not lower the error of the given model explain nothing. Something is missing only if that
-        // model is above the noise.
-        let fits = |noise: f64| first.validate_rmse <= DIAGNOSE.floor_margin * noise;
         if !diagnosis.missing.is_empty() || !diagnosis.stand_ins.is_empty() {
-            diagnosis.verdict = match first.noise_rmse.is_some_and(fits) {
-                true => Verdict::NothingMissing,
-                false => Verdict::Unexplained,
-            };
+            diagnosis.verdict = of_the_given(first.validate_rmse, first.noise_rmse);
         }
         diagnosis.missing.clear();
         diagnosis.stand_ins.clear();
@@ -280,6 +274,14 @@ fn as_written(diagnosis: &mut Diagnosis, given: &Model, records: &[Record]) -> O
     }
     let whole = diagnosis.held_out_by == HeldOutBy::Records && diagnosis.restarted_s.is_none();
     judged.filter(|_| !whole)
+}
+
+/// The verdict on a given model whose error no effect lowers: something is missing unless it is at a known `noise` level.
+fn of_the_given(error: f64, noise: Option<f64>) -> Verdict {
+    match noise.is_some_and(|noise| error <= DIAGNOSE.floor_margin * noise) {
+        true => Verdict::NothingMissing,
+        false => Verdict::Unexplained,
+    }
 }
 
 /// The measured channel that the error of the final model depends on, with the explained share. `None` if there is
@@ -297,4 +299,16 @@ fn followed_channel(diagnosis: &Diagnosis, failures: Option<&Failures>) -> Optio
             }
             _ => None,
         })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_given_model_lacks_something_unless_it_is_at_a_known_noise_level() {
+        assert_eq!(of_the_given(1.02, Some(1.0)), Verdict::NothingMissing);
+        assert_eq!(of_the_given(1.04, Some(1.0)), Verdict::Unexplained);
+        assert_eq!(of_the_given(1.0, None), Verdict::Unexplained);
+    }
 }

@@ -610,11 +610,15 @@ mod tests {
             wrong_readings(&model, records, &scores)
         };
         assert_eq!(remark(&records), None);
+        let clean = records.clone();
         let middle = records[0].len() / 2;
         for record in &mut records {
             record.y[middle] += 20.0;
         }
+        let (right, _) = score(&model, &clean).expect("stable");
+        let fit = right.held_out().expect("scored").fit_percent;
         let remark = remark(&records).expect("wrong readings");
+        assert!(remark.contains(&format!("FIT is {fit:.1} %")), "{remark}");
         let count: usize = remark
             .split(' ')
             .next()

@@ -9,7 +9,6 @@ use crate::discover::Glance;
 use crate::picture::{significant, time};
 use crate::residual::NoiseSource;
 use crate::terms::second_lag_s;
-use crate::user_effect::Definition;
 use model_core::effect::Place;
 use model_core::effects::spec;
 
@@ -332,12 +331,8 @@ fn of_channels(diagnosis: &Diagnosis) -> &[String] {
         true => &diagnosis.stand_ins,
         false => &diagnosis.missing,
     };
-    let is_of_a_channel = |name: &String| {
-        let own = diagnosis.model.definition(name);
-        own.is_some_and(Definition::is_of_a_channel)
-    };
-    let leading = all.iter().take_while(|name| is_of_a_channel(name)).count();
-    &all[..leading]
+    let of_a_channel = |name: &&String| diagnosis.model.is_of_a_channel(name);
+    &all[..all.iter().take_while(of_a_channel).count()]
 }
 
 /// Surrogates in addition to named effects.

@@ -7,9 +7,11 @@ use super::{NotTried, RULES, Ranked};
 use crate::model::Model;
 use crate::parallel;
 use crate::terms::{
-    Candidate, Found, HeldOut, Hypothesis, Judged, Screen, Search, Table, Term, p_value,
+    Candidate, Found, HeldOut, Hypothesis, Judged, RULES as TERMS, Screen, Search, Table, Term,
+    p_value,
 };
 use model_core::effect::Spec;
+use std::sync::atomic::Ordering;
 
 /// Name of a longer memory in equivalence sets.
 pub const FLOW_MEMORY: &str = "flow-memory";
@@ -50,7 +52,7 @@ impl Rival {
     }
 }
 
-/// All candidates for `context`, best first. The most promising ones and `named` are refitted.
+/// All candidates for `context`, best first. Those in reach of the least error and `named` are refitted.
 pub(super) fn rivals(search: &Search<'_>, context: &Hypothesis, named: &[&str]) -> Vec<Rival> {
     match Screen::new(search.judge, context.judged.model()) {
         Some(screen) => {
@@ -61,7 +63,9 @@ pub(super) fn rivals(search: &Search<'_>, context: &Hypothesis, named: &[&str]) 
     }
 }
 
-/// The most promising candidates and `named`, refitted on `context`. None if no effect is named.
+/// All candidates of `table`, fitted briefly on `context`; those whose error is then in reach of the least, base terms and
+/// `named` in full. A first-order prediction excludes none: it says little of a threshold. None is fitted if no effect is
+/// named.
 fn refitted(
     search: &Search<'_>,
     context: &Hypothesis,
@@ -69,67 +73,39 @@ fn refitted(
     screen: &Screen<'_>,
     table: &Table,
 ) -> Vec<Rival> {
-    let of = |name: &str| {
-        let is = |candidate: &&Candidate| candidate.term.effect().is_some_and(|s| s.name == name);
-        table.candidates.iter().find(is)
-    };
-    let found: Vec<&Candidate> = named.iter().filter_map(|name| of(name)).collect();
-    rated(
-        screen,
-        table,
-        context.judged.rmse(),
-        |place, name, candidate| {
-            // Base terms often have a small first-order prediction and fit equally well after a refit. The same
-            // holds for named effects at another grid point. Both are refitted too.
-            let wanted = place < RULES.ranked_in_full
-                || candidate.term.effect().is_none()
-                || named.contains(&name)
-                || (found.iter()).any(|own| table.are_alike(screen, own, candidate));
-            if !wanted || named.is_empty() {
-                return None;
-            }
-            let proposal = screen.alone(table, candidate)?;
-            let brief =
-                search.set_out(context.judged.model(), &proposal, crate::terms::RULES.brief)?;
+    let (model, before) = (context.judged.model(), context.judged.rmse());
+    let all = best_of_each_kind(table);
+    let begun = parallel::each(&all, |(_, candidate)| {
+        let wanted = !named.is_empty() && !search.interrupt.load(Ordering::Relaxed);
+        let proposal = wanted.then(|| screen.alone(table, candidate)).flatten()?;
+        let brief = search.set_out(model, &proposal, TERMS.brief)?;
+        let rmse = search.judge.held_out(|_| &brief.model).ok()?.rmse();
+        Some((rmse, proposal, brief))
+    });
+    let least = begun.iter().flatten().map(|(rmse, ..)| *rmse);
+    let least = least.fold(before, f64::min);
+    // At least half of the largest gain, which says more than the error where all are near the noise.
+    let reach = (TERMS.in_reach * least).min(0.5 * (least + before));
+    let pairs: Vec<_> = all.iter().zip(begun).collect();
+    let mut rated: Vec<Rival> = parallel::each(pairs, |((name, candidate), begun)| {
+        let spec = candidate.term.effect();
+        let wanted = |rmse: f64| rmse <= reach || spec.is_none() || named.contains(&name.as_str());
+        let begun = begun.filter(|(rmse, ..)| wanted(*rmse));
+        let refitted = begun.and_then(|(_, proposal, brief)| {
             let terms = [context.terms.clone(), proposal.terms].concat();
             let count = terms.len();
             search.finish(terms, brief, count)
-        },
-    )
-}
-
-fn rated(
-    screen: &Screen<'_>,
-    table: &Table,
-    before: f64,
-    refit: impl Fn(usize, &str, &Candidate) -> Option<Hypothesis> + Sync,
-) -> Vec<Rival> {
-    // The best candidate of each kind, in the order of the predictions.
-    let mut best: Vec<(String, &Candidate)> = Vec::new();
-    for candidate in &table.candidates {
-        let name = match &candidate.term {
-            Term::Effect { spec, .. } => spec.name.to_owned(),
-            Term::Memory(_) | Term::Wake(_) => FLOW_MEMORY.to_owned(),
-            Term::Inertia(_) => FLOW_LAG.to_owned(),
-            Term::Path { spec, .. } => spec.name.to_owned(),
-            Term::State(_) | Term::Product(_) | Term::Offset | Term::LevelRate => continue,
-        };
-        if !best.iter().any(|(met, _)| *met == name) {
-            best.push((name, candidate));
-        }
-    }
-    let mut rated: Vec<Rival> = parallel::each(0..best.len(), |place| {
-        let (name, candidate) = &best[place];
+        });
         Rival {
             name: name.clone(),
-            spec: candidate.term.effect(),
-            refitted: refit(place, name, candidate),
+            spec,
+            refitted,
             promised: before * (1.0 - candidate.held_out).max(0.0).sqrt(),
         }
     });
     // Candidates that the screening rejected are listed as tried.
-    let useless = screen.model().candidates().filter(|spec| {
-        screen.pointless(spec).is_none() && !best.iter().any(|(name, _)| name == spec.name)
+    let useless = model.candidates().filter(|spec| {
+        screen.pointless(spec).is_none() && !all.iter().any(|(name, _)| name == spec.name)
     });
     rated.extend(useless.map(|spec| Rival {
         name: spec.name.to_owned(),
@@ -143,6 +119,23 @@ fn rated(
         fitted.then(a.rmse().total_cmp(&b.rmse()))
     });
     rated
+}
+
+/// The best candidate of each effect and kind of base term, with its name, in the order of the predictions.
+fn best_of_each_kind(table: &Table) -> Vec<(String, &Candidate)> {
+    let mut best: Vec<(String, &Candidate)> = Vec::new();
+    for candidate in &table.candidates {
+        let name = match &candidate.term {
+            Term::Effect { spec, .. } | Term::Path { spec, .. } => spec.name,
+            Term::Memory(_) | Term::Wake(_) => FLOW_MEMORY,
+            Term::Inertia(_) => FLOW_LAG,
+            Term::State(_) | Term::Product(_) | Term::Offset | Term::LevelRate => continue,
+        };
+        if !best.iter().any(|(met, _)| met == name) {
+            best.push((name.to_owned(), candidate));
+        }
+    }
+    best
 }
 
 impl Session<'_> {
@@ -203,4 +196,38 @@ pub(super) fn not_tried(search: &Search<'_>, model: &Model) -> Vec<NotTried> {
         })
     });
     reasons.collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::residual::plants::{base, records};
+    use crate::terms::Bench;
+    use std::sync::atomic::AtomicBool;
+
+    /// A hysteresis whose lower threshold is 0 imitates friction. What the screening says of either depends on its starting
+    /// point, so both are fitted, whichever was found.
+    #[test]
+    fn an_effect_that_does_as_well_as_the_found_one_is_fitted() {
+        let records = records(&["dry-friction"], &[], 3);
+        let bench = Bench::of(&base(&records), &records).expect("records to learn from");
+        let never = AtomicBool::new(false);
+        let search = Search::silent(&bench.judge, 1, &never);
+        let context = Hypothesis::new(bench.judge.refitted(&bench.given).expect("stable"));
+        let fitted = |named: &[&str]| {
+            let all = rivals(&search, &context, named);
+            let fitted = all.into_iter().filter(|rival| rival.refitted.is_some());
+            fitted.map(|rival| rival.name).collect::<Vec<_>>()
+        };
+        assert!(fitted(&[]).is_empty());
+        for name in ["attachment-hysteresis", "dry-friction"] {
+            let fitted = fitted(&[name]);
+            assert!(fitted.contains(&"dry-friction".to_owned()), "{fitted:?}");
+        }
+        let unlike = fitted(&["dry-friction"]);
+        assert!(
+            !unlike.contains(&"vortex-shedding".to_owned()),
+            "{unlike:?}"
+        );
+    }
 }

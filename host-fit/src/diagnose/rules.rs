@@ -50,8 +50,6 @@ rules! {
     /// Where the level of slow noise is unknown, a model error is also significant if it exceeds this share,
     /// because no usable recording is so noisy.
     too_much: f64 = 0.06, "share of the variance of y", "the public sets";
-    /// Number of candidates refitted for the ranking, in addition to the named ones.
-    ranked_in_full: usize = 4, "", "judgement: lower-ranked candidates never became the best";
     /// From this number of `validate` records on, every third is set aside for an independent error estimate.
     enough_to_quote: usize = 4, "records", "judgement: at least three records are needed for the choice";
     /// If a measured channel explains at least this cross-validated share of the error, an effect of that channel

@@ -80,7 +80,7 @@ impl Search<'_> {
                 }
             }
         }
-        self.with_effects_instead(&mut found);
+        self.with_effects_instead_of_given(&mut found, &origin);
         (found, origin)
     }
 }

@@ -76,6 +76,22 @@ impl Hypothesis {
         Term::all_of(other, self.judged.model()).is_some_and(|terms| terms.is_empty())
     }
 
+    /// The hypothesis with all its terms on top of the model of `lean`, those of a given structure included. `None` if the
+    /// two models differ in other things.
+    pub(super) fn on_top_of(&self, lean: &Self) -> Option<Self> {
+        let (own, lean) = (self.judged.model(), lean.judged.model());
+        let effects = self.terms.iter().filter(|term| term.effect().is_some());
+        let effects: Vec<&Term> = effects.collect();
+        let without = |model: Model, term: &&Term| term.taken_from(&model, lean);
+        let bare = effects.iter().rev().fold(own.clone(), without);
+        let mut terms = Term::all_of(&bare, lean)?;
+        terms.extend(effects.into_iter().cloned());
+        Some(Self {
+            terms,
+            ..self.clone()
+        })
+    }
+
     /// The hypothesis with the lowest error among those of `all` that have none of these effects.
     pub(crate) fn best_without<'a>(
         all: impl Iterator<Item = &'a Self>,

@@ -27,10 +27,39 @@ struct Begun {
     score: f64,
 }
 
+impl Found {
+    /// The result of a search from the given structure, in terms on top of `lean`. `None` if it has others.
+    fn on_top_of(&self, lean: &Hypothesis) -> Option<Self> {
+        Some(Self {
+            root: lean.clone(),
+            best: self.best.on_top_of(lean)?,
+            bare: self.bare.on_top_of(lean)?,
+            all: (self.all.iter())
+                .filter_map(|one| one.on_top_of(lean))
+                .collect(),
+            tried: self.tried,
+        })
+    }
+}
+
 impl Search<'_> {
+    /// [`with_effects_instead`](Self::with_effects_instead), also for the base terms of a given structure from which the
+    /// search started. `lean` is the model of the lowest order.
+    pub(crate) fn with_effects_instead_of_given(&self, found: &mut Found, lean: &Hypothesis) {
+        let anew = found.root.is_given().then(|| found.on_top_of(lean));
+        let Some(mut anew) = anew.flatten() else {
+            return self.with_effects_instead(found);
+        };
+        let before = anew.best.score();
+        self.with_effects_instead(&mut anew);
+        if anew.best.score() < before {
+            *found = anew;
+        }
+    }
+
     /// Replaces base terms of the best hypothesis by an effect if that lowers the score, and by further effects while the
     /// error is above the noise level.
-    pub(crate) fn with_effects_instead(&self, found: &mut Found) {
+    fn with_effects_instead(&self, found: &mut Found) {
         let mut enough = RULES.at_the_floor;
         while (found.best.is_bare() || self.over(&found.best) > enough)
             && let Some(better) = self.with_an_effect_instead(found)
@@ -313,11 +342,11 @@ mod tests {
     use super::*;
     use crate::residual::plants::{base, records};
     use crate::terms::Bench;
-    use model_core::effects::spec;
     use std::sync::atomic::AtomicBool;
 
     /// Two lags imitate a valve that opens and closes with different lags. No exchange of one lag for the valve has a
-    /// lower score, because the other lag still imitates it.
+    /// lower score, because the other lag still imitates it. It makes no difference whether the search found the lags or
+    /// they were given.
     #[test]
     fn an_effect_takes_the_place_of_the_lags_that_imitate_it() {
         let records = records(&["valve-lag"], &[], 3);
@@ -332,27 +361,29 @@ mod tests {
         };
         let imitation = bases.run(root.clone(), None).best;
         assert!(imitation.terms.len() > 1, "{}", imitation.words());
-        let mut found = Found {
-            root,
+        let searched = Found {
+            root: root.clone(),
             best: imitation.clone(),
             ..imitation.clone().alone()
         };
-        search.with_effects_instead(&mut found);
-        let found = found.best;
-        let valve = spec("valve-lag").expect("in the catalogue");
-        let names: Vec<&str> = found
-            .terms
-            .iter()
-            .filter_map(Term::effect)
-            .map(|effect| effect.name)
-            .collect();
-        assert_eq!(names, [valve.name], "{}", found.words());
-        // One of the terms is the effect.
-        assert!(
-            found.terms.len() <= imitation.terms.len(),
-            "{}",
-            found.words()
-        );
-        assert!(found.score() < imitation.score());
+        let given = Hypothesis::of_given(imitation.judged.clone()).alone();
+        for mut found in [searched, given] {
+            search.with_effects_instead_of_given(&mut found, &root);
+            let found = found.best;
+            let names: Vec<&str> = found
+                .terms
+                .iter()
+                .filter_map(Term::effect)
+                .map(|effect| effect.name)
+                .collect();
+            assert_eq!(names, ["valve-lag"], "{}", found.words());
+            // One of the terms is the effect.
+            assert!(
+                found.terms.len() <= imitation.terms.len(),
+                "{}",
+                found.words()
+            );
+            assert!(found.score() < imitation.score());
+        }
     }
 }

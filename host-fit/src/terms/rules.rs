@@ -122,9 +122,6 @@ rules! {
     some: f64 = 0.1, "times the amplitude in the grid", "judgement";
     /// Ridge regularisation of curve points that the data rarely visit.
     ridge: f64 = 1e-4, "share of the mean square of the points", "judgement";
-    /// Candidates whose changes of the free run correlate more than this are refitted as possible
-    /// replacements of each other.
-    alike: f64 = 0.85, "", "theory 4.3: above this correlation no fit of the paper's structure distinguishes the effects";
     /// Grid points kept per effect for sets of candidates.
     kept_points: usize = 2, "", "judgement: limits the time";
     /// Lags kept per kind for sets of candidates.

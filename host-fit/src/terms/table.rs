@@ -67,13 +67,6 @@ impl Table {
         }
     }
 
-    /// Whether two candidates change the free run so similarly that a refit may not distinguish them.
-    pub(crate) fn are_alike(&self, screen: &Screen, one: &Candidate, other: &Candidate) -> bool {
-        let directions = one.columns.iter().map(|i| &self.columns[*i]);
-        let likeness = directions.map(|direction| self.likeness(screen, other, direction));
-        likeness.fold(0.0, f64::max) > RULES.alike
-    }
-
     /// Correlation of a candidate's change with a direction over the estimation samples.
     pub(crate) fn likeness(
         &self,

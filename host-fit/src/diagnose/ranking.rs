@@ -63,8 +63,8 @@ pub(super) fn rivals(search: &Search<'_>, context: &Hypothesis, named: &[&str]) 
     }
 }
 
-/// All candidates of `table`, fitted briefly on `context`; those whose error is then in reach of the least, base terms and
-/// `named` in full. A first-order prediction excludes none: it says little of a threshold. None is fitted if no effect is
+/// All candidates of `table`, fitted briefly on `context`; those whose error is then in reach of the least and `named` in
+/// full. A first-order prediction excludes none: it says little of a threshold. None is fitted if no effect is
 /// named.
 fn refitted(
     search: &Search<'_>,
@@ -89,8 +89,13 @@ fn refitted(
     let pairs: Vec<_> = all.iter().zip(begun).collect();
     let mut rated: Vec<Rival> = parallel::each(pairs, |((name, candidate), begun)| {
         let spec = candidate.term.effect();
-        let wanted = |rmse: f64| rmse <= reach || spec.is_none() || named.contains(&name.as_str());
-        let begun = begun.filter(|(rmse, ..)| wanted(*rmse));
+        // A full fit also moves the lags of a base term.
+        let reach = match spec {
+            Some(spec) if named.contains(&spec.name) => f64::INFINITY,
+            Some(_) => reach,
+            None => TERMS.promising * least,
+        };
+        let begun = begun.filter(|(rmse, ..)| *rmse <= reach);
         let refitted = begun.and_then(|(_, proposal, brief)| {
             let terms = [context.terms.clone(), proposal.terms].concat();
             let count = terms.len();

@@ -20,7 +20,8 @@ rules! {
     at_the_floor: f64 = 1.005, "times the noise level", "two standard deviations of the error of three records of 10 s";
     /// If the best model is above this factor of the noise level, the second-best is followed as well.
     near_the_floor: f64 = 1.05, "times the noise level", "judgement: half of the uncertainty of `y_sd`";
-    /// The second-best model is followed if its error is within this factor of the best.
+    /// The second-best model is followed, and terms are removed from the best model without effects, if its error is within
+    /// this factor of the best.
     rival: f64 = 2.0, "times the best error", "simulated rigs with a memory: the correct first step was always \
          within this factor";
     /// Delays between samples are rounded to whole samples if the error rises by no more than this.

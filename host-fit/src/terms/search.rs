@@ -143,11 +143,14 @@ impl Search<'_> {
         let end = best(&all, |_| true);
         let bare_end = best(&all, Hypothesis::is_bare);
         let mut found = self.pruned(all[end].clone(), &root);
+        let is_rival = all[bare_end].score() < found.score() + RULES.rival.ln();
         let bare = if bare_end == end {
             found.clone()
-        } else {
+        } else if is_rival {
             (self.progress)("removing terms from the best model without effects");
             self.pruned(all[bare_end].clone(), &root)
+        } else {
+            all[bare_end].clone()
         };
         if self.over(&found) > RULES.at_the_floor
             && !effort.is_spent()

@@ -3,9 +3,11 @@
 
 use host_fit::codegen::portable::{self, Precision};
 use host_fit::codegen::{Language, write};
-use host_fit::model::{Model, Training};
+use host_fit::model::{Delay, Model, Training};
 use host_fit::user_effect::Definition;
+use model_core::effects::StateDependentDelay;
 use scenarios::agreement::{Case, Gradings, Tool, cases, run};
+use std::fs;
 
 #[test]
 fn exported_models_say_what_the_host_says() {
@@ -91,4 +93,28 @@ starts = [0.1]
                 .clone()
                 .all(|line| line.is_empty() || line.starts_with("//!"))
     );
+}
+
+/// The delay of a diverged state is no number of samples.
+#[test]
+fn a_model_that_diverges_ends_in_nan_in_python() {
+    if !Tool::Python.is_installed() {
+        return;
+    }
+    let model = Model {
+        a: vec![1.5],
+        b: vec![0.1],
+        delay: Delay::of::<StateDependentDelay<f64>>(&[40.0, 10.0, -4.0], vec![1.0], true),
+        ..Model::default()
+    };
+    let folder = tempfile::tempdir().expect("a folder");
+    let text = write(&model, &Language::Python).expect("a file");
+    fs::write(folder.path().join("flow.py"), text).expect("written");
+    let program = "import numpy, flow; y = flow.Model().simulate(numpy.ones(5000)); \
+                   assert y[0] == 0 and numpy.isnan(y[-1]), y";
+    let mut python = Tool::Python.command();
+    let python = python.args(["-c", program]).current_dir(folder.path());
+    let said = python.output().expect("Python");
+    let errors = String::from_utf8_lossy(&said.stderr);
+    assert!(said.status.success(), "{errors}");
 }

@@ -1,7 +1,7 @@
 //! Which effects are not distinguishable from a named one, and the experiment that would distinguish them.
 
 use super::ranking::{FLOW_LAG, Rival, alike, rivals};
-use super::session::Session;
+use super::session::{Compared, Session};
 use crate::experiment::Separation;
 use crate::model::Model;
 use crate::terms::{Hypothesis, Judged, Likelihood, Term, is_out, shares_won};
@@ -50,13 +50,14 @@ impl Set {
 }
 
 impl Session<'_> {
-    /// The equivalence sets of the first `told` effects.
+    /// The equivalence sets of the first `told` effects. A member fits the validation records as well as the effect, and has
+    /// more evidence than the model without either: what the records do not support is no alternative.
     pub(super) fn sets(
         &self,
         last: &Hypothesis,
         order: &[&'static Spec],
         told: usize,
-        first: &[Rival],
+        alone: &Compared,
         root: &Hypothesis,
     ) -> Vec<Set> {
         order
@@ -67,15 +68,16 @@ impl Session<'_> {
                     effect: spec,
                     others: Vec::new(),
                 };
-                let owned: Vec<Rival>;
-                let others = if order.len() == 1 {
-                    first
+                let owned: Compared;
+                let Compared { context, others } = if order.len() == 1 {
+                    alone
                 } else {
                     let of = |t: &Term| t.effect().is_some_and(|s| s.name == spec.name);
                     let index = last.terms.iter().position(of);
                     let without = index.and_then(|i| self.search.without(last, i, root));
-                    let Some(without) = without else { return set };
-                    owned = rivals(self.search, &without, &[spec.name]);
+                    let Some(context) = without else { return set };
+                    let others = rivals(self.search, &context, &[spec.name]);
+                    owned = Compared { context, others };
                     &owned
                 };
                 let absent = |name: &str| !order.iter().any(|s| s.name == name);
@@ -86,8 +88,15 @@ impl Session<'_> {
                 let own = &last.judged.held_out;
                 let theirs = fitted.iter().map(|(_, judged)| &judged.held_out);
                 let shares = shares_won(&std::iter::once(own).chain(theirs).collect::<Vec<_>>());
+                let without = self.evidence_of(context.judged.model());
+                let is_supported = |judged: &Judged| {
+                    let with = self.evidence_of(judged.model());
+                    with.zip(without)
+                        .is_none_or(|(with, without)| with > without)
+                };
                 for (index, (rival, judged)) in fitted.iter().enumerate() {
-                    if alike(&judged.held_out, own) || !is_out(&shares, index + 1) {
+                    let fits = alike(&judged.held_out, own) || !is_out(&shares, index + 1);
+                    if fits && is_supported(judged) {
                         let model = judged.model().clone();
                         set.others.push((rival.name.clone(), model));
                     }

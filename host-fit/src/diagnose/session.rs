@@ -48,9 +48,9 @@ struct Way {
 }
 
 /// A base model, and the result of adding each effect to it.
-struct Compared {
-    context: Hypothesis,
-    others: Vec<Rival>,
+pub(super) struct Compared {
+    pub(super) context: Hypothesis,
+    pub(super) others: Vec<Rival>,
 }
 
 impl Compared {
@@ -133,7 +133,7 @@ impl Session<'_> {
         if conclusion.verdict == Verdict::EffectMissing
             && self.as_given.rmse()
                 <= (1.0 + RULES.worthwhile) * self.error_as_given(&conclusion.model)
-            && !self.first_is_certified(&conclusion.model, &way, &compared.others, &found)
+            && !self.first_is_certified(&conclusion.model, &way, &compared, &found)
         {
             let explained =
                 self.fits(&conclusion.model.judged) || judge.noise_source == NoiseSource::Scatter;
@@ -152,7 +152,7 @@ impl Session<'_> {
         if effects.is_empty() && !named.is_bare() {
             compared = self.compared(&last, &found);
         }
-        let Compared { context, others } = compared;
+        let Compared { context, others } = &compared;
         let claims = verdict == Verdict::EffectMissing;
         let order = way.order;
         let refitted = first[1].step.clone();
@@ -164,7 +164,7 @@ impl Session<'_> {
         ladder.extend(way.rungs);
         // Surrogates are not named, and no experiment is proposed for them.
         let told = if claims { way.proven } else { order.len() };
-        let mut sets = self.sets(&last, &order, told, &others, &found.root);
+        let mut sets = self.sets(&last, &order, told, &compared, &found.root);
         let alternatives: Vec<Model> = sets
             .iter()
             .flat_map(|set| &set.others)
@@ -198,7 +198,7 @@ impl Session<'_> {
         } else {
             &found.best
         };
-        let certificates = self.certificates(subject, &sets, &others, &found);
+        let certificates = self.certificates(subject, &sets, others, &found);
         // The first effect without a certificate and all after it are surrogates.
         let holds = |spec: &&&'static Spec| {
             let own = certificates.get(spec.name);
@@ -227,7 +227,7 @@ impl Session<'_> {
         let posterior = named_sets
             .map(|set| posterior(set).unwrap_or_default())
             .collect();
-        let mut ranking = self.ranked(&context, &others, &found);
+        let mut ranking = self.ranked(context, others, &found);
         for entry in &mut ranking {
             // The ranking shows the parameters of the final model, and of the equivalences only those that hold
             // for that model.
@@ -301,11 +301,11 @@ impl Session<'_> {
         &self,
         model: &Hypothesis,
         way: &Way,
-        others: &[Rival],
+        compared: &Compared,
         found: &Found,
     ) -> bool {
-        let sets = self.sets(model, &way.order, way.proven, others, &found.root);
-        let certificates = self.certificates(model, &sets, others, found);
+        let sets = self.sets(model, &way.order, way.proven, compared, &found.root);
+        let certificates = self.certificates(model, &sets, &compared.others, found);
         let first = way
             .order
             .first()

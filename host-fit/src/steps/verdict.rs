@@ -176,7 +176,7 @@ fn finding(diagnosis: &Diagnosis, plant: Plant) -> Answer {
             let alpha = certificates().map(|one| one.alpha).fold(0.0, f64::max);
             Answer::new(
                 Tone::Finding,
-                format!("{}, and something is unexplained", missing(names, &[])),
+                format!("{}, and something is unexplained", missing(&called(diagnosis, names), &[])),
             )
             .evidence(fall(diagnosis, &joined(&diagnosis.stand_ins)))
             .confidence(format!(
@@ -304,9 +304,24 @@ fn behaviour(diagnosis: &Diagnosis) -> String {
 /// each with its equivalence set.
 fn claim(diagnosis: &Diagnosis, plant: Plant) -> String {
     match plant {
-        Plant::Flow => missing(&diagnosis.missing, &diagnosis.sets),
+        Plant::Flow => {
+            let sets = diagnosis.sets.iter().map(|set| called(diagnosis, set));
+            let sets: Vec<Vec<String>> = sets.collect();
+            missing(&called(diagnosis, &diagnosis.missing), &sets)
+        }
         _ => format!("missing: {}", behaviour(diagnosis)),
     }
+}
+
+/// Effects by name; the tool's own for a measured channel by the channel.
+fn called(diagnosis: &Diagnosis, names: &[String]) -> Vec<String> {
+    let model = &diagnosis.model;
+    let channel = |name: &str| model.spec(name).and_then(|spec| spec.channel);
+    let called = |name: &String| match channel(name).filter(|_| model.is_of_a_channel(name)) {
+        Some(channel) => format!("the measured input `{channel}`"),
+        None => name.clone(),
+    };
+    names.iter().map(called).collect()
 }
 
 fn missing(names: &[String], sets: &[Vec<String>]) -> String {

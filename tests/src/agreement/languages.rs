@@ -25,7 +25,9 @@ impl Tool {
     /// All of them.
     pub const ALL: [Self; 4] = [Self::C, Self::Board, Self::Python, Self::Octave];
 
-    pub(super) fn command(self) -> Command {
+    /// Its command, without arguments.
+    #[must_use]
+    pub fn command(self) -> Command {
         match self {
             Self::C => Command::new("gcc"),
             Self::Board => Command::new("arm-none-eabi-gcc"),

@@ -143,8 +143,8 @@ pub struct Ranked {
     pub confounded_with: Vec<String>,
     /// Whether the gain is significant and above the practical margin.
     pub significant: bool,
-    /// Whether the whole model was refitted with the candidate; if not, the numbers are first-order predictions of the
-    /// screening.
+    /// Whether the whole model was refitted with the candidate; if not, the numbers are first estimates, by a brief fit or
+    /// the prediction of the screening.
     pub refitted: bool,
     /// ln of the evidence of the refitted model, nats. Comparable within one diagnosis.
     pub evidence_nats: Option<f64>,

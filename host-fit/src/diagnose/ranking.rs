@@ -25,13 +25,13 @@ pub(super) fn alike(a: &HeldOut, b: &HeldOut) -> bool {
     worse.rmse() <= (1.0 + RULES.alike) * better.rmse() || p_value(worse, better) >= RULES.level
 }
 
-/// A candidate with its first-order prediction, and refitted if the prediction was good enough.
+/// A candidate with a first estimate, and refitted if that was good enough.
 pub(super) struct Rival {
     /// The effect's name, or that of a base term: a memory, a lag, a path of the drive.
     pub(super) name: String,
     pub(super) spec: Option<&'static Spec>,
     pub(super) refitted: Option<Hypothesis>,
-    /// First-order prediction of the validation error, inner units rms.
+    /// Validation error after a brief fit, or as the screening predicts it, inner units rms.
     pub(super) promised: f64,
 }
 
@@ -63,8 +63,8 @@ pub(super) fn rivals(search: &Search<'_>, context: &Hypothesis, named: &[&str]) 
     }
 }
 
-/// All candidates of `table`, fitted briefly on `context`; those whose error is then in reach of the least and `named` in
-/// full. A first-order prediction excludes none: it says little of a threshold. None is fitted if no effect is
+/// All candidates of `table`, fitted briefly on `context`; `named` and those whose error is then in reach of the least are
+/// fitted in full. A first-order prediction excludes none: it says little of a threshold. None is fitted if no effect is
 /// named.
 fn refitted(
     search: &Search<'_>,
@@ -95,6 +95,8 @@ fn refitted(
             Some(_) => reach,
             None => TERMS.promising * least,
         };
+        let predicted = || before * (1.0 - candidate.held_out).max(0.0).sqrt();
+        let promised = (begun.as_ref()).map_or_else(predicted, |(rmse, ..)| *rmse);
         let begun = begun.filter(|(rmse, ..)| *rmse <= reach);
         let refitted = begun.and_then(|(_, proposal, brief)| {
             let terms = [context.terms.clone(), proposal.terms].concat();
@@ -105,7 +107,7 @@ fn refitted(
             name: name.clone(),
             spec,
             refitted,
-            promised: before * (1.0 - candidate.held_out).max(0.0).sqrt(),
+            promised,
         }
     });
     // Candidates that the screening rejected are listed as tried.

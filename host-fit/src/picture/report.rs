@@ -363,7 +363,7 @@ const HEADS: [(&str, &str); 9] = [
     ),
     (
         "outcome",
-        "screened only: the candidate was rated by a first-order prediction and was too weak to be refitted",
+        "screened only: the candidate was rated by a first-order prediction or a brief fit and was too weak to be refitted",
     ),
     (
         "p",

@@ -215,7 +215,7 @@ pub(crate) fn is_told(r: &Ranked, diagnosis: &Diagnosis) -> bool {
     r.refitted || named.any(|name| *name == r.effect)
 }
 
-/// The candidates of which only a first-order estimate exists, in one sentence; `None` if there are none.
+/// The candidates of which only a first estimate exists, in one sentence; `None` if there are none.
 pub(crate) fn screened_only(diagnosis: &Diagnosis, plant: Plant) -> Option<String> {
     let all = diagnosis.ranking.iter();
     let screened: Vec<&Ranked> = all.filter(|r| !is_told(r, diagnosis)).collect();
@@ -227,9 +227,9 @@ pub(crate) fn screened_only(diagnosis: &Diagnosis, plant: Plant) -> Option<Strin
         share => format!("lowers the error by {share}"),
     };
     Some(match screened.len() {
-        1 => format!("{name} was screened only: by the first-order estimate it {lowers}."),
+        1 => format!("{name} was screened only: by a first estimate it {lowers}."),
         count => format!(
-            "{count} candidates were screened only: by the first-order estimate, the best of them ({name}) {lowers}."
+            "{count} candidates were screened only: by a first estimate, the best of them ({name}) {lowers}."
         ),
     })
 }
@@ -240,7 +240,7 @@ pub(crate) fn every_candidate(diagnosis: &Diagnosis, plant: Plant) -> Vec<Vec<St
     named_first(diagnosis).into_iter().map(row).collect()
 }
 
-/// As [`every_candidate`], without those of which only a first-order estimate exists.
+/// As [`every_candidate`], without those of which only a first estimate exists.
 pub(crate) fn ranking_rows(diagnosis: &Diagnosis, plant: Plant) -> Vec<Vec<String>> {
     let told = named_first(diagnosis).into_iter();
     let told = told.filter(|r| is_told(r, diagnosis));

@@ -6,6 +6,7 @@ use super::{Answer, Tone};
 use crate::data::Plant;
 use crate::diagnose::{Diagnosis, FLOW_LAG, FLOW_MEMORY, HeldOutBy, Memory, RULES, Rung, Verdict};
 use crate::discover::Glance;
+use crate::model::Model;
 use crate::picture::{significant, time};
 use crate::residual::NoiseSource;
 use crate::terms::second_lag_s;
@@ -176,7 +177,7 @@ fn finding(diagnosis: &Diagnosis, plant: Plant) -> Answer {
             let alpha = certificates().map(|one| one.alpha).fold(0.0, f64::max);
             Answer::new(
                 Tone::Finding,
-                format!("{}, and something is unexplained", missing(&called(diagnosis, names), &[])),
+                format!("{}, and something is unexplained", missing(&called(&diagnosis.model, names), &[])),
             )
             .evidence(fall(diagnosis, &joined(&diagnosis.stand_ins)))
             .confidence(format!(
@@ -305,19 +306,18 @@ fn behaviour(diagnosis: &Diagnosis) -> String {
 fn claim(diagnosis: &Diagnosis, plant: Plant) -> String {
     match plant {
         Plant::Flow => {
-            let sets = diagnosis.sets.iter().map(|set| called(diagnosis, set));
-            let sets: Vec<Vec<String>> = sets.collect();
-            missing(&called(diagnosis, &diagnosis.missing), &sets)
+            let called = |names: &Vec<String>| called(&diagnosis.model, names);
+            let sets: Vec<Vec<String>> = diagnosis.sets.iter().map(called).collect();
+            missing(&called(&diagnosis.missing), &sets)
         }
         _ => format!("missing: {}", behaviour(diagnosis)),
     }
 }
 
-/// Effects by name; the tool's own for a measured channel by the channel.
-fn called(diagnosis: &Diagnosis, names: &[String]) -> Vec<String> {
-    let model = &diagnosis.model;
-    let channel = |name: &str| model.spec(name).and_then(|spec| spec.channel);
-    let called = |name: &String| match channel(name).filter(|_| model.is_of_a_channel(name)) {
+/// Effects by name, measured inputs by their channel.
+fn called(model: &Model, names: &[String]) -> Vec<String> {
+    let input = |name: &str| model.measured_inputs().find(|spec| spec.name == name);
+    let called = |name: &String| match input(name).and_then(|spec| spec.channel) {
         Some(channel) => format!("the measured input `{channel}`"),
         None => name.clone(),
     };
@@ -495,11 +495,30 @@ fn bench_check(sets: &[Vec<String>]) -> &'static str {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::residual::plants::{base, records};
+    use crate::terms::measured_inputs;
 
     #[test]
     fn a_bound_on_p_is_said_with_its_sign() {
         let said = [0.0, 0.012_34, 1.0].map(p_bound);
         assert_eq!(said, ["< 10⁻⁶", "≤ 0.012", "= 1"]);
+    }
+
+    /// A sensitivity that a channel changes is no input.
+    #[test]
+    fn a_measured_input_is_called_by_its_channel() {
+        let mut records = records(&[], &[], 1);
+        records.truncate(1);
+        let wander = |k: usize| 300.0 + 20.0 * (k as f64 / 90.0).sin();
+        let fan = (0..records[0].len()).map(wander).collect();
+        records[0].channels.insert("Fan 2".to_owned(), fan);
+        let model = base(&records).with_inputs(measured_inputs(&records));
+        let names = ["input-fan-2", "scaled-by-fan-2", "valve-lag"].map(str::to_owned);
+        assert!(names.iter().all(|name| model.spec(name).is_some()));
+        assert_eq!(
+            called(&model, &names),
+            ["the measured input `Fan 2`", "scaled-by-fan-2", "valve-lag"]
+        );
     }
 
     #[test]

@@ -33,6 +33,7 @@
 //! | [`codegen`], [`design`], [`extend`] | uses of a model: code generation, control laws, added effects |
 //! | [`diagnose`], [`power`] | which effect is missing, with its confidence; the detectable size of an effect |
 //! | [`discover`] | a missing term that is not in the catalogue |
+//! | [`curves`] | curves in free form, in place of an equation |
 //! | [`terms`] | one search over lags, the sensor's offset and effects |
 //! | [`experiment`], [`residual`] | the command that distinguishes models best; where a model fails |
 //! | [`analysis`] | residual correlations and spectrum, step responses, poles |
@@ -50,6 +51,7 @@ pub mod analysis;
 pub mod averages;
 pub mod baseline;
 pub mod codegen;
+pub mod curves;
 pub mod delay;
 pub mod design;
 pub mod diagnose;

@@ -159,6 +159,7 @@ fn pages() -> Result<Vec<(String, String)>> {
         "slow-wake",
         "level-rate",
         "reading-curve",
+        "direct-part",
         "sensor-resonance",
         "zero-offset",
         "constant-delay",

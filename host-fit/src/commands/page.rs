@@ -1,7 +1,8 @@
 //! Results as pages.
 
+use host_fit::curves::Entry;
 use host_fit::data::{DataSet, Plant, Record};
-use host_fit::discover::{Entry, FoundTerm, TRACED, Trace};
+use host_fit::discover::{FoundTerm, TRACED, Trace};
 use host_fit::indicators::{ErrorKind, Indicators, Scores, score};
 use host_fit::model::Model;
 use host_fit::picture::{

@@ -2,6 +2,7 @@
 
 use super::RULES;
 use super::alternatives::Set;
+use super::flexible::Curve;
 use super::ranking::Rival;
 use super::session::Session;
 use crate::model::Model;
@@ -33,13 +34,33 @@ pub struct Certificate {
     /// imitate the effect with more parameters and less evidence do not count.
     #[serde(skip)]
     pub share: f64,
+    /// The best curve in place of the effect, if the model is above the noise level and the effect has evidence against
+    /// all other models.
+    pub curve: Option<Curve>,
 }
 
 impl Certificate {
     /// Whether the effect is certified.
     #[must_use]
     pub fn holds(&self) -> bool {
-        self.log_e >= -self.alpha.ln()
+        self.is_evident() && self.better_curve().is_none()
+    }
+
+    /// The curve that prevents the certificate.
+    #[must_use]
+    pub fn better_curve(&self) -> Option<&Curve> {
+        let curve = self.curve.as_ref()?;
+        (self.is_evident() && curve.evidence_nats < self.least()).then_some(curve)
+    }
+
+    /// Whether the evidence against other models is large enough.
+    pub(super) fn is_evident(&self) -> bool {
+        self.log_e >= self.least()
+    }
+
+    /// Evidence that a certificate needs, nats.
+    fn least(&self) -> f64 {
+        -self.alpha.ln()
     }
 
     /// Upper bound of the p-value: the inverse of the e-value (Markov's inequality).
@@ -186,19 +207,22 @@ impl Session<'_> {
             alpha: RULES.level_of_search,
             records,
             share: 1.0 - left / without.max(f64::MIN_POSITIVE),
+            curve: None,
         })
     }
 
     /// The certificate of each effect of `subject`: the largest evidence of the models with the effect, divided by the
     /// largest evidence of the models that contain neither the effect, nor another member of its equivalence set, nor an
     /// effect that reads the same channel. A model without the effect may have more evidence than `subject` because of
-    /// its other terms; the effect is therefore also added to such models.
+    /// its other terms; the effect is therefore also added to such models. `against_curves`: whether effects are also
+    /// compared with curves if `subject` is above the noise level.
     pub(super) fn certificates(
         &self,
         subject: &Hypothesis,
         sets: &[Set],
         others: &[Rival],
         found: &Found,
+        against_curves: bool,
     ) -> BTreeMap<String, Certificate> {
         if subject.is_bare() {
             return BTreeMap::new();
@@ -210,7 +234,7 @@ impl Session<'_> {
         let mut lesser: Vec<Option<Hypothesis>> = parallel::each(0..subject.terms.len(), without);
         // Null models are often common to several effects, so each is fitted once.
         let mut distinct: Vec<Hypothesis> = Vec::new();
-        let mut effects: Vec<(&Term, Vec<usize>)> = Vec::new();
+        let mut effects: Vec<(&Term, Option<Hypothesis>, Vec<usize>)> = Vec::new();
         for (index, term) in subject.terms.iter().enumerate() {
             let Some(effect) = term.effect() else {
                 continue;
@@ -229,7 +253,7 @@ impl Session<'_> {
             let names: Vec<&str> = names.chain(alike.map(|other| other.name)).collect();
             let nulls = [
                 Some(found.bare.clone()),
-                lesser[index].take(),
+                lesser[index].clone(),
                 Hypothesis::best_without(found.all.iter(), &names).cloned(),
                 Hypothesis::best_without(rivals(), &names).cloned(),
             ];
@@ -241,12 +265,13 @@ impl Session<'_> {
                 })
             });
             let places = places.collect();
-            effects.push((term, places));
+            effects.push((term, lesser[index].take(), places));
         }
         let nulls: Vec<Option<Null>> = parallel::each(&distinct, |null| self.null(null));
         let model = subject.judged.model();
         let own = self.evidence_of(model);
-        let certificates = effects.into_iter().filter_map(|(term, places)| {
+        let against_curves = against_curves && !self.is_at_noise(&subject.judged.held_out);
+        let certificates = effects.into_iter().filter_map(|(term, lesser, places)| {
             let name = term.effect()?.name;
             // If the evidence of a null model is unknown, nothing is certified.
             let evident = |at: &usize| Some((*at, nulls[*at]?));
@@ -262,7 +287,11 @@ impl Session<'_> {
             let mut nulls: Vec<Null> = own_nulls.iter().map(|(_, null)| *null).collect();
             nulls.extend(self.given_without(&[name]));
             let evidence = own.into_iter().chain(with).reduce(f64::max)?;
-            let certificate = self.certificate(subject, evidence, &nulls, found)?;
+            let mut certificate = self.certificate(subject, evidence, &nulls, found)?;
+            if against_curves && certificate.is_evident() {
+                let lesser = lesser.unwrap_or_else(|| found.bare.clone());
+                certificate.curve = self.against_curves(term, &lesser, evidence);
+            }
             Some((name.to_owned(), certificate))
         });
         certificates.collect()
@@ -375,6 +404,7 @@ mod tests {
                 alpha: 0.02,
                 records: Vec::new(),
                 share: 1.0,
+                curve: None,
             };
             certificate.p_value()
         };
@@ -392,6 +422,7 @@ mod tests {
                 alpha: 0.02,
                 records: Vec::new(),
                 share,
+                curve: None,
             };
             (certificate.holds(), certificate.holds_beside_others())
         };

@@ -6,6 +6,7 @@
 mod alternatives;
 mod certificate;
 mod estimate;
+mod flexible;
 mod memory;
 mod outcome;
 mod quoted;
@@ -19,6 +20,7 @@ pub use crate::terms::HeldOutBy;
 pub use certificate::{Certificate, Parsimony};
 pub use estimate::ParameterEstimate;
 pub(crate) use estimate::estimates_among;
+pub use flexible::Curve;
 pub use memory::Memory;
 pub use outcome::{Diagnosis, NotTried, Ranked, Rung, Verdict};
 pub use quoted::Quoted;

@@ -198,7 +198,7 @@ impl Session<'_> {
         } else {
             &found.best
         };
-        let certificates = self.certificates(subject, &sets, others, &found);
+        let certificates = self.certificates(subject, &sets, others, &found, !order.is_empty());
         // The first effect without a certificate and all after it are surrogates.
         let holds = |spec: &&&'static Spec| {
             let own = certificates.get(spec.name);
@@ -305,7 +305,7 @@ impl Session<'_> {
         found: &Found,
     ) -> bool {
         let sets = self.sets(model, &way.order, way.proven, compared, &found.root);
-        let certificates = self.certificates(model, &sets, &compared.others, found);
+        let certificates = self.certificates(model, &sets, &compared.others, found, false);
         let first = way
             .order
             .first()

@@ -22,7 +22,7 @@ impl Session<'_> {
     }
 
     /// Whether an error does not exceed the noise, by a test or within the uncertainty of a known level.
-    fn is_at_noise(&self, held_out: &HeldOut) -> bool {
+    pub(super) fn is_at_noise(&self, held_out: &HeldOut) -> bool {
         let judge = self.judge();
         judge.p_above_noise(held_out, RULES.floor_margin) >= RULES.level
             || (judge.noise_source != NoiseSource::Scatter

@@ -1,12 +1,11 @@
 //! The search from screened curves to a significant term and its equivalence set.
 
-use super::candidate::{Candidate, best};
-use super::coordinate::Coordinate;
-use super::outcome::{Alike, Found, Smallest, coordinate_words};
-use super::place::Entry;
-use super::screening::{Context, Screened, diverse, reference};
-use super::term::Term;
+use super::outcome::{Alike, Found, Smallest};
 use super::{Options, RULES};
+use crate::curves::{
+    Candidate, Context, Coordinate, Entry, RULES as CURVES, Screened, Term, best, diverse,
+    reference, refitted,
+};
 use crate::diagnose::RULES as DIAGNOSE;
 use crate::experiment::Separation;
 use crate::model::Model;
@@ -50,12 +49,12 @@ impl Finder<'_> {
                 smallest = self.smallest(&curves);
                 // A first-order prediction underestimates the gain, so a candidate with half of the required gain
                 // is refitted.
-                let wanted = (1.0 - RULES.promised * RULES.worthwhile) * base.judged.rmse();
+                let wanted = (1.0 - RULES.promised * CURVES.worthwhile) * base.judged.rmse();
                 let left = |curve: &Screened| (1.0 - curve.held_out).max(0.0).sqrt();
                 curves.retain(|curve| left(curve) * beside.judged.rmse() < wanted);
-                RULES.tried
+                CURVES.tried
             } else {
-                RULES.tried_leaner
+                CURVES.tried_leaner
             };
             let curves = diverse(curves, most);
             pool.extend(curves.into_iter().map(|curve| (beside, curve)));
@@ -159,8 +158,16 @@ impl Finder<'_> {
             !other.term.is_like(&leader.term) && self.may_be_told(&other.term, base)
         });
         let near = context.near(&leader.term).into_iter();
-        all.extend(self.refitted(&without, diverse(others, RULES.tried)));
-        all.extend(self.refitted(&without, near.take(RULES.of_a_kind).collect()));
+        all.extend(refitted(
+            self.search,
+            &without,
+            diverse(others, CURVES.tried),
+        ));
+        all.extend(refitted(
+            self.search,
+            &without,
+            near.take(CURVES.of_a_kind).collect(),
+        ));
         // With the final base model a different candidate may fit best.
         all.push(leader);
         let found = self.finer(best(&mut all)?);
@@ -168,7 +175,7 @@ impl Finder<'_> {
         let gain = 1.0 - last.rmse() / base.judged.rmse();
         let little = self.takes_too_little(last, &without.judged, base);
         let drifts_more = judge.drifts_more(last, &base.judged);
-        if gain < RULES.worthwhile || little || drifts_more {
+        if gain < CURVES.worthwhile || little || drifts_more {
             return None;
         }
         let p = self.p_value(base, last, looked_at);
@@ -178,7 +185,7 @@ impl Finder<'_> {
         let term = &found.term;
         let told = |term: &Term| Alike {
             place: term.entry.place(),
-            coordinate: coordinate_words(term.entry, &term.coordinate.out(self.units)),
+            coordinate: term.entry.depends_on(&term.coordinate.out(self.units)),
         };
         // If one coordinate enters one place in two forms, they are reported as one finding.
         let same = |other: &Term| other.is_like(term) || told(other) == told(term);

@@ -2,64 +2,14 @@
 //! term's coordinate is chosen again with those lags.
 
 use super::RULES;
-use super::candidate::{Candidate, best, best_of_each_place};
 use super::finder::Finder;
-use super::place::{Entry, Place};
-use super::screening::{Context, Screened, diverse, reference};
-use super::term::Term;
-use crate::fit::{Fit, FitOptions, fit};
-use crate::model::Model;
+use crate::curves::{
+    Candidate, Context, Entry, Heirs, RULES as CURVES, Screened, best, best_of_each_place, diverse,
+    finished, kind, refitted, tried,
+};
 use crate::order;
 use crate::parallel;
-use crate::terms::{self, Hypothesis};
-use std::sync::atomic::Ordering;
-
-/// A base model with a term, fitted for a few iterations.
-struct Tried {
-    term: Term,
-    brief: Fit,
-    /// The memory terms of the base.
-    memory: Vec<terms::Term>,
-}
-
-/// Group of a candidate for comparison: its place, the number of terms of the base, and the catalogue's delay
-/// law if the base has one.
-type Kind = (Place, usize, Option<&'static str>);
-
-fn kind(term: &Term, memory: &[terms::Term], model: &Model) -> Kind {
-    (term.entry.place(), memory.len(), model.delay.effect_name())
-}
-
-/// Selection of candidates for further fitting: the leading ones, the best at each place, and the best for each
-/// base. A brief fit does not rank base models fairly: a low-order base needs more iterations, and a high-order one
-/// has adapted to a wrong term.
-struct Heirs {
-    free: usize,
-    taken: Vec<Kind>,
-}
-
-impl Heirs {
-    fn of(free: usize) -> Self {
-        Self {
-            free,
-            taken: Vec::new(),
-        }
-    }
-
-    fn takes(&mut self, (place, terms, law): Kind) -> bool {
-        let new_place = self.taken.iter().all(|other| other.0 != place);
-        let new_base = self
-            .taken
-            .iter()
-            .all(|other| (other.1, other.2) != (terms, law));
-        let taken = self.free > 0 || new_place || new_base;
-        self.free = self.free.saturating_sub(1);
-        if taken {
-            self.taken.push((place, terms, law));
-        }
-        taken
-    }
-}
+use crate::terms::Hypothesis;
 
 impl Finder<'_> {
     /// The fitted terms of some curves, each in its model. If a model is at the noise level, only its term is returned.
@@ -70,8 +20,8 @@ impl Finder<'_> {
     ) -> Vec<Candidate> {
         let progress = self.search.progress;
         progress(&format!("term {number}: refitting {} curves", curves.len()));
-        let tried = parallel::some(curves, |(beside, curve)| self.tried(beside, curve));
-        let mut all = self.finished(tried);
+        let tried = parallel::some(curves, |(beside, curve)| tried(self.search, beside, curve));
+        let mut all = finished(self.search, tried);
         progress(&format!("term {number}: searching the flow's lags again"));
         for candidate in self.leading(&mut all) {
             let with = self.search.run(candidate.with, None).best;
@@ -142,7 +92,7 @@ impl Finder<'_> {
             let Some(other) = self.another_coordinate(&last, number) else {
                 break;
             };
-            if other.size() > last.size() - RULES.twins || other.size() > reach {
+            if other.size() > last.size() - CURVES.twins || other.size() > reach {
                 break;
             }
             let with = self.search.run(other.with.clone(), None).best;
@@ -163,8 +113,8 @@ impl Finder<'_> {
             .into_iter()
             .filter(|entry| entry.place() == place);
         let others = context.closer(&there.collect::<Vec<_>>());
-        let others = diverse(others, RULES.tried_leaner);
-        best(&mut self.refitted(&without, others))
+        let others = diverse(others, CURVES.tried_leaner);
+        best(&mut refitted(self.search, &without, others))
     }
 
     /// The model without the term, refitted.
@@ -173,92 +123,5 @@ impl Finder<'_> {
         let mut without = Hypothesis::new(self.search.judge.refitted(&bare).ok()?);
         without.terms.clone_from(&candidate.with.terms);
         Some(without)
-    }
-
-    /// Refits one model with each of these curves; returns the best.
-    pub(super) fn refitted(&self, beside: &Hypothesis, curves: Vec<Screened>) -> Vec<Candidate> {
-        let tried = parallel::some(curves, |curve| self.tried(beside, curve));
-        self.finished(tried)
-    }
-
-    /// A model with the term, fitted for a few iterations. The fit starts with the term at 0 if its predicted values
-    /// make the free run diverge.
-    fn fitted(&self, model: &Model, term: &Term) -> Option<Fit> {
-        if self.search.interrupt.load(Ordering::Relaxed) {
-            return None;
-        }
-        let judge = self.search.judge;
-        let learning = judge.learning(0);
-        let reference = reference(&term.coordinate, &learning);
-        let from = |term: &Term| {
-            let with = term.added_to(model, reference)?;
-            let options = FitOptions {
-                iterations: terms::RULES.brief,
-                ..judge.options_for(&with)
-            };
-            fit(&with, &learning, &options).ok()
-        };
-        let nothing = vec![0.0; term.values().len()];
-        from(term).or_else(|| from(&term.with_values(&nothing)))
-    }
-
-    /// A model with a curve, fitted for a few iterations.
-    fn tried(&self, beside: &Hypothesis, curve: Screened) -> Option<Tried> {
-        let model = beside.judged.model();
-        // On/off commands do not identify the response to jets of part strength, which a term at the jet
-        // needs.
-        let term = curve.term.with_free_time(RULES.time_of_a_curve);
-        let unknown = term.entry == Entry::Jet && self.search.judge.on_off;
-        let mut responses = vec![model.grading];
-        if unknown {
-            responses.extend(self.search.judge.other_gradings(model.grading));
-        }
-        let fits = parallel::some(responses, |grading| {
-            let model = Model {
-                grading,
-                ..model.clone()
-            };
-            self.fitted(&model, &term)
-        });
-        let by_error = |a: &Fit, b: &Fit| a.mean_square().total_cmp(&b.mean_square());
-        Some(Tried {
-            brief: fits.into_iter().min_by(by_error)?,
-            term,
-            memory: beside.terms.clone(),
-        })
-    }
-
-    /// The best of some brief fits, refitted in full. The refit also moves the lags of the base, which had imitated the
-    /// missing term.
-    fn finished(&self, tried: Vec<Tried>) -> Vec<Candidate> {
-        let judge = self.search.judge;
-        let mut rated: Vec<(f64, Tried)> = parallel::some(tried, |tried| {
-            let rmse = judge.held_out(|_| &tried.brief.model).ok()?.rmse();
-            Some((terms::size(rmse, &tried.brief.model), tried))
-        });
-        order::ascending(&mut rated, |one| one.0);
-        let mut heirs = Heirs::of(RULES.finished);
-        rated
-            .retain(|(_, tried)| heirs.takes(kind(&tried.term, &tried.memory, &tried.brief.model)));
-        parallel::some(rated, |(_, tried)| {
-            let least = tried.memory.len();
-            let with = self.search.finish(tried.memory, tried.brief, least)?;
-            Some(Candidate::of(tried.term, with))
-        })
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_best_are_followed_and_the_best_of_each_place_and_base() {
-        let mut heirs = Heirs::of(2);
-        let taken = [6, 6, 6, 0, 0, 3].map(|terms| heirs.takes((Place::Jet, terms, None)));
-        assert_eq!(taken, [true, true, false, true, false, true]);
-        assert!(heirs.takes((Place::Jet, 0, Some("edge-dependent-delay"))));
-        assert!(heirs.takes((Place::Sensor, 6, None)));
-        assert!(!heirs.takes((Place::Sensor, 0, None)));
     }
 }

@@ -2,10 +2,8 @@
 
 use super::RULES;
 use super::finder::Finder;
-use super::formula::FORMS;
 use super::outcome::Found;
-use super::screening::reference;
-use super::term::{Shape, Term};
+use crate::curves::{FORMS, Shape, Term, reference};
 use crate::parallel;
 use crate::terms::{HeldOut, Hypothesis, Judged, p_value};
 

@@ -6,25 +6,18 @@
 //! beyond the base. The best are refitted with the whole model, the flow's lags are searched again, and the
 //! validation error decides. A term must beat the best base without it, tested over all screened curves.
 
-mod candidate;
-mod coordinate;
 mod finder;
 mod follow;
-mod formula;
 mod formulas;
 mod outcome;
-mod place;
 mod rules;
-mod screening;
-mod term;
 mod trace;
 
-pub use coordinate::Coordinate;
 pub use outcome::{Alike, CurvePoint, Discovery, FoundTerm, Smallest};
-pub use place::{Entry, Place};
 pub use rules::{RULES, Rules};
 pub use trace::{Signal, TRACED, Trace, TracedRecord};
 
+use crate::curves::{Context, Entry, Place, Term};
 use crate::data::Record;
 use crate::diagnose::{DiagnoseError, Rung};
 use crate::excitation::says_little;
@@ -34,7 +27,6 @@ use finder::Finder;
 use outcome::Found;
 use serde::Serialize;
 use std::sync::atomic::{AtomicBool, Ordering};
-use term::Term;
 
 /// Options of a discovery.
 #[derive(Clone, Debug)]
@@ -71,14 +63,14 @@ pub struct Glance {
 pub fn glance(model: &Model, records: &[Record], interrupt: &AtomicBool) -> Option<Glance> {
     let bench = Bench::of(model, records)?;
     let search = Search::silent(&bench.judge, 0, interrupt);
-    let context = screening::Context::new(&search, &bench.given, 1)?;
+    let context = Context::new(&search, &bench.given, 1)?;
     let first = context.all(&Entry::ALL).into_iter().next()?;
     (first.score < 0.0).then(|| Glance {
         place: first.term.entry.place(),
-        coordinate: outcome::coordinate_words(
-            first.term.entry,
-            &first.term.coordinate.out(&bench.units),
-        ),
+        coordinate: first
+            .term
+            .entry
+            .depends_on(&first.term.coordinate.out(&bench.units)),
         error_taken_percent: 100.0 * first.held_out,
     })
 }

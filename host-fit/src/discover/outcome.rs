@@ -1,10 +1,7 @@
 //! The result of a discovery.
 
-use super::candidate::Candidate;
-use super::coordinate::Coordinate;
-use super::place::{Entry, Place};
-use super::term::{Shape, Term};
 use super::trace::Trace;
+use crate::curves::{Candidate, Place, Shape, Term};
 use crate::diagnose::{ParameterEstimate, Rung};
 use crate::experiment::Separation;
 use crate::fit::Fit;
@@ -206,7 +203,7 @@ pub(super) fn told(
         effect: name,
         place,
         changes: entry.words(),
-        coordinate: coordinate_words(entry, &written.coordinate),
+        coordinate: entry.depends_on(&written.coordinate),
         coordinate_unit: written.coordinate.unit().symbol(),
         excess_taken_percent: share(found.taken),
         formula_taken_percent: share(found.formula_taken),
@@ -220,16 +217,6 @@ pub(super) fn told(
         alike: found.alike.clone(),
         stability_percent: share(found.stability),
         file: written.file(&comment),
-    }
-}
-
-/// The coordinate of a term, in the user's units. A rate and a sensitivity also act in proportion to y.
-pub(super) fn coordinate_words(entry: Entry, coordinate: &Coordinate) -> String {
-    let own = coordinate.words();
-    match entry {
-        Entry::Rate if own != "y" => format!("{own} × y"),
-        Entry::Sensitivity if own != "reading" => format!("{own} × reading"),
-        _ => own,
     }
 }
 

@@ -6,30 +6,10 @@ rules! {
     /// When a term outside the catalogue is reported, and how its curve is drawn.
     pub struct Rules in "discover";
 
-    /// Largest number of points of a curve. The coordinate spends equal times between neighbouring points.
-    points: usize = 8, "", "judgement: limits the number of derivatives per run";
-    /// A coordinate with fewer distinct points than this is not screened.
-    fewest_points: usize = 3, "", "judgement: a curve needs more than the two points of a line";
-    /// Points inserted in one round where a curve is steepest, if they lower the error enough.
-    inserted: usize = 3, "", "judgement: three points locate a step four times more closely";
     /// Rounds of inserting points.
     refinements: usize = 2, "rounds", "judgement";
-    /// Largest number of points of a curve after insertion.
-    most_points: usize = 11, "", "judgement: a run then has 1.5 times as many derivatives";
-    /// Share of the samples outside the first and the last point.
-    beyond: f64 = 0.01, "share of the samples", "judgement";
-    /// Least distance of a point to the next, relative to its distance from the first point.
-    apart: f64 = 0.05, "share of the distance from the first point", "judgement: rests and times since edges span three decades";
     /// A curve is refitted if its predicted gain is at least this share of the practical margin.
     promised: f64 = 0.5, "share", "judgement: the first-order gain is smaller than the gain after a refit";
-    /// Curves that are fitted for a few iterations per round.
-    tried: usize = 10, "", "judgement";
-    /// Curves that are fitted for a few iterations, for each base of lower order than the best.
-    tried_leaner: usize = 4, "", "judgement";
-    /// Largest number of curves fitted for a few iterations that have the same place and kind of coordinate.
-    of_a_kind: usize = 2, "", "judgement: memories of neighbouring lengths have similar gains";
-    /// Curves refitted in full, in addition to the best of each place and each base.
-    finished: usize = 4, "", "judgement";
     /// Candidates for which the flow's lags are searched again, in addition to the best of each place and each
     /// base.
     settled: usize = 2, "", "judgement: each of these searches takes as long as `identify`";
@@ -43,10 +23,6 @@ rules! {
     contends: f64 = 1.5, "times the best error", "the curve of a true quadratic term had an error of 1.066 × the noise level, a curve at a wrong place 1.025 ×";
     /// A model within this factor of the noise level gets no further term.
     at_the_floor: f64 = 1.02, "times the noise level", "the curve of a true jet term had an error of 1.05 × the noise level, that of a wrong sensor term 1.09 ×";
-    /// Curves at one place whose errors differ by less than this are the same curve.
-    twins: f64 = 0.001, "share of the rms error", "equal coordinates differ by rounding only";
-    /// A term must lower the validation error of the best base without it by this fraction.
-    worthwhile: f64 = 0.015, "share of the rms error", "as for effects of the catalogue";
     /// If the noise level is known, a term must explain this share of the unexplained variance.
     least_share: f64 = 0.25, "share of the model error above the noise", "as for the surrogates of `diagnose`; on a drifting rig a wrong delay term explained 19 %";
     /// A base model with a validation error below this is near the noise level. A term must then explain the
@@ -75,12 +51,6 @@ rules! {
     smallness: f64 = 0.01, "", "judgement: the size of the trace then has the same weight as its curvature over ten knots";
     /// A place is reported if its posterior probability is at least this.
     likely: f64 = 0.9, "probability", "convention";
-    /// Longest extension of a delay.
-    longest_delay_s: f64 = 0.1, "s at 1 kHz", "judgement: three times the delays of the simulated rigs";
-    /// A filter time constant is fitted with a curve within this factor of its grid value.
-    time_of_a_curve: f64 = 1.7, "", "half a grid step; with a larger range the filter time of a memory of y can shrink to 0";
     /// A filter time constant is fitted with a formula within this factor.
     time_of_a_formula: f64 = 10.0, "", "judgement";
-    /// Largest change that is searched, relative or in units of y.
-    largest: f64 = 5.0, "", "judgement";
 }

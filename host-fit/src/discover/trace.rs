@@ -8,8 +8,7 @@
 //! as n/c.
 
 use super::RULES;
-use super::place::{Entry, Place};
-use super::screening::{ON, room};
+use crate::curves::{Entry, ON, Place, RULES as CURVES, room};
 use crate::data::Record;
 use crate::fit::sensitivities;
 use crate::model::Model;
@@ -200,7 +199,7 @@ fn with_signal(entry: Entry, model: &Model, knots: &[f64]) -> Option<Model> {
         points.join(", ")
     );
     let shift = room(entry, model);
-    let longest = shift + RULES.longest_delay_s;
+    let longest = shift + CURVES.longest_delay_s;
     let mut text = format!(
         "name = \"trace\"\nplace = \"{}\"\nsummary = \"the missing signal\"\nexpression = \"{}\"\n",
         entry.of_effect(),

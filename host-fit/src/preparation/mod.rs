@@ -68,7 +68,8 @@ impl Preparation {
         }
         // If rests are too short to distinguish an offset from a relaxation, offsets are estimated by the response
         // through whole records.
-        let Some((moving, tared)) = MovingZero::by_response(records) else {
+        let tared = MovingZero::by_own_levels(records).or_else(|| MovingZero::by_response(records));
+        let Some((moving, tared)) = tared else {
             return prepared;
         };
         Self {

@@ -58,6 +58,30 @@ struct Moments {
     yy: f64,
 }
 
+impl Moments {
+    /// The moments after projecting out a constant as well.
+    fn without_level(&self) -> Self {
+        Self {
+            one: 0.0,
+            x: 0.0,
+            y: 0.0,
+            xx: self.xx - self.x * self.x / self.one,
+            xy: self.xy - self.x * self.y / self.one,
+            yy: self.yy - self.y * self.y / self.one,
+        }
+    }
+}
+
+/// The level of a record under u = 0, in a first-order response with a level for each record.
+pub(super) struct OwnLevel {
+    /// The level, y.
+    pub(super) level: f64,
+    /// Residual of the response, y.
+    pub(super) deviations: Vec<f64>,
+    /// Number of samples that determine the level: fewer than the record has, because an initial state is fitted too.
+    pub(super) samples: usize,
+}
+
 impl FirstOrder {
     /// Fits the response to `records` by least squares over a refined grid; `None` if y does not follow u.
     #[must_use]
@@ -65,40 +89,12 @@ impl FirstOrder {
         let total: usize = records.iter().map(Record::len).sum();
         let stride = total.div_ceil(RULES.reference_samples).max(1);
         let thinned: Vec<Thinned> = records.iter().map(|r| Thinned::of(r, stride)).collect();
-        let longest = thinned.iter().map(|r| r.y.len()).max()? as f64;
-        let shortest = thinned.iter().map(|r| r.y.len()).min()? as f64;
-        let times: Vec<f64> = grid(RULES.shortest_time, longest, 1.5);
-        let mut delays: Vec<f64> = vec![0.0];
-        delays.extend(grid(1.0, (shortest / 3.0).max(1.0), 1.3));
         let whole = whole_spread(&thinned);
         if !(whole > 0.0 && whole.is_finite()) {
             return None;
         }
-        let points: Vec<(f64, f64)> = times
-            .iter()
-            .flat_map(|time| delays.iter().map(|delay| (*delay, *time)))
-            .collect();
-        let least = |points: Vec<(f64, f64)>| {
-            let all = parallel::each(&points, |&(delay, time)| {
-                (residual(&thinned, delay, time).0, delay, time)
-            });
-            all.into_iter().min_by(|a, b| a.0.total_cmp(&b.0))
-        };
-        let (mut left, mut delay, mut time) = least(points)?;
-        let (mut wide, mut factor) = ((0.3 * delay).max(1.0), 1.3_f64);
-        for _ in 0..RULES.refinements {
-            let near = [-1.0, -0.5, 0.0, 0.5, 1.0];
-            let around = near.iter().flat_map(|i| {
-                let delay = (delay + i * wide).max(0.0);
-                near.map(|j| (delay, (time * factor.powf(j)).max(RULES.shortest_time)))
-            });
-            let best = least(around.collect())?;
-            if best.0 <= left {
-                (left, delay, time) = best;
-            }
-            wide *= 0.5;
-            factor = factor.sqrt();
-        }
+        let (left, delay, time) =
+            searched(&thinned, |delay, time| residual(&thinned, delay, time).0)?;
         let explained = 1.0 - left / whole;
         let (_, level, gain) = residual(&thinned, delay, time);
         let scale = stride as f64;
@@ -123,11 +119,104 @@ impl FirstOrder {
         })
     }
 
+    /// The level of each record in a response with a level for each record; `None` if there is no such response.
+    pub(super) fn own_levels(records: &[Record]) -> Option<Vec<OwnLevel>> {
+        let total: usize = records.iter().map(Record::len).sum();
+        let stride = total.div_ceil(RULES.reference_samples).max(1);
+        let thinned: Vec<Thinned> = records.iter().map(|r| Thinned::of(r, stride)).collect();
+        let of = |records: &[Thinned], delay: f64, time: f64| -> Vec<Moments> {
+            records
+                .iter()
+                .map(|record| moments(record, delay, time))
+                .collect()
+        };
+        let gain = |all: &[Moments]| {
+            let within = all.iter().map(Moments::without_level);
+            let (xx, xy, yy) = within.fold((0.0, 0.0, 0.0), |(xx, xy, yy), own| {
+                (xx + own.xx, xy + own.xy, yy + own.yy)
+            });
+            (xy / xx, yy - xy * xy / xx)
+        };
+        let left = |delay: f64, time: f64| {
+            let left = gain(&of(&thinned, delay, time)).1;
+            if left.is_finite() {
+                left.max(0.0)
+            } else {
+                f64::INFINITY
+            }
+        };
+        let (_, delay, time) = searched(&thinned, left)?;
+        let (delay, time) = (delay * stride as f64, time * stride as f64);
+        let whole: Vec<Thinned> = records.iter().map(|r| Thinned::of(r, 1)).collect();
+        let all = of(&whole, delay, time);
+        let gain = gain(&all).0;
+        let each = whole.iter().zip(&all).map(|(record, own)| {
+            let level = (own.y - gain * own.x) / own.one;
+            let x = response(record, delay, time);
+            let left = record.y.iter().zip(x);
+            let mut left: Vec<f64> = left.map(|(y, x)| y - level - gain * x).collect();
+            let fading = |k: usize| (-(k as f64) / time).exp();
+            let along: f64 = left
+                .iter()
+                .enumerate()
+                .map(|(k, left)| left * fading(k))
+                .sum();
+            let initial = along / (0..left.len()).map(|k| fading(k).powi(2)).sum::<f64>();
+            for (k, left) in left.iter_mut().enumerate() {
+                *left -= initial * fading(k);
+            }
+            OwnLevel {
+                level,
+                deviations: left,
+                samples: own.one as usize,
+            }
+        });
+        Some(each.collect())
+    }
+
     /// y at rest under a command of `u`.
     #[must_use]
     pub fn at_rest(&self, u: f64) -> f64 {
         self.level + self.gain * u
     }
+}
+
+/// The delay and the time constant with the least residual over a refined grid, and that residual.
+fn searched(
+    thinned: &[Thinned],
+    residual: impl Fn(f64, f64) -> f64 + Sync,
+) -> Option<(f64, f64, f64)> {
+    let longest = thinned.iter().map(|r| r.y.len()).max()? as f64;
+    let shortest = thinned.iter().map(|r| r.y.len()).min()? as f64;
+    let times: Vec<f64> = grid(RULES.shortest_time, longest, 1.5);
+    let mut delays: Vec<f64> = vec![0.0];
+    delays.extend(grid(1.0, (shortest / 3.0).max(1.0), 1.3));
+    let points: Vec<(f64, f64)> = times
+        .iter()
+        .flat_map(|time| delays.iter().map(|delay| (*delay, *time)))
+        .collect();
+    let least = |points: Vec<(f64, f64)>| {
+        let all = parallel::each(&points, |&(delay, time)| {
+            (residual(delay, time), delay, time)
+        });
+        all.into_iter().min_by(|a, b| a.0.total_cmp(&b.0))
+    };
+    let (mut left, mut delay, mut time) = least(points)?;
+    let (mut wide, mut factor) = ((0.3 * delay).max(1.0), 1.3_f64);
+    for _ in 0..RULES.refinements {
+        let near = [-1.0, -0.5, 0.0, 0.5, 1.0];
+        let around = near.iter().flat_map(|i| {
+            let delay = (delay + i * wide).max(0.0);
+            near.map(|j| (delay, (time * factor.powf(j)).max(RULES.shortest_time)))
+        });
+        let best = least(around.collect())?;
+        if best.0 <= left {
+            (left, delay, time) = best;
+        }
+        wide *= 0.5;
+        factor = factor.sqrt();
+    }
+    Some((left, delay, time))
 }
 
 /// Numbers from `low` to `high`, each a factor above the one before.
@@ -166,16 +255,28 @@ fn residual(records: &[Thinned], delay: f64, time: f64) -> (f64, f64, f64) {
     (left.max(0.0), level, gain)
 }
 
-/// The moments of a record, after projecting out a decaying initial state.
-fn moments(record: &Thinned, delay: f64, time: f64) -> Moments {
+/// The response x of a record: dead time, then a first-order lag.
+fn response(record: &Thinned, delay: f64, time: f64) -> impl Iterator<Item = f64> {
     let whole = delay.floor();
     let (fraction, lag) = (delay - whole, whole as usize);
     let kept = (-1.0 / time).exp();
-    let at = |k: usize, lag: usize| k.checked_sub(lag).map_or(record.before, |k| record.u[k]);
-    let (mut x, mut state) = (record.before, 1.0);
+    let at = move |k: usize, lag: usize| k.checked_sub(lag).map_or(record.before, |k| record.u[k]);
+    let mut x = record.before;
+    (0..record.y.len()).map(move |k| {
+        let now = x;
+        let u = at(k, lag) + fraction * (at(k, lag + 1) - at(k, lag));
+        x += (1.0 - kept) * (u - x);
+        now
+    })
+}
+
+/// The moments of a record, after projecting out a decaying initial state.
+fn moments(record: &Thinned, delay: f64, time: f64) -> Moments {
+    let kept = (-1.0 / time).exp();
+    let mut state = 1.0;
     let mut sums = Moments::default();
     let (mut e_one, mut e_x, mut e_y, mut e_e) = (0.0, 0.0, 0.0, 0.0);
-    for (k, y) in record.y.iter().enumerate() {
+    for (x, y) in response(record, delay, time).zip(&record.y) {
         sums.one += 1.0;
         sums.x += x;
         sums.y += y;
@@ -186,8 +287,6 @@ fn moments(record: &Thinned, delay: f64, time: f64) -> Moments {
         e_x += state * x;
         e_y += state * y;
         e_e += state * state;
-        let u = at(k, lag) + fraction * (at(k, lag + 1) - at(k, lag));
-        x += (1.0 - kept) * (u - x);
         state *= kept;
     }
     sums.one -= e_one * e_one / e_e;

@@ -294,6 +294,45 @@ fn left_by<'a>(
 }
 
 impl MovingZero {
+    /// As [`MovingZero::of`], but with levels from a first-order response with a level for each record; returns also the
+    /// corrected records. If the levels of records differ by more than y moves within them, no response with a common
+    /// level describes them, and no rest is recognised. A misfit of the response gives levels that differ by less than
+    /// the misfit itself, so they must differ by much more.
+    pub(super) fn by_own_levels(records: &[Record]) -> Option<(Self, Vec<Record>)> {
+        if records.len() < 2 || records.iter().any(|record| record.y_sd.is_some()) {
+            return None;
+        }
+        let mut own = FirstOrder::own_levels(records)?;
+        let deviations: Vec<Vec<f64>> = own
+            .iter_mut()
+            .map(|own| std::mem::take(&mut own.deviations))
+            .collect();
+        let noise = Noise::of(&deviations);
+        let levels: Vec<f64> = own.iter().map(|own| own.level).collect();
+        let samples: Vec<usize> = own.iter().map(|own| own.samples).collect();
+        let (p, zeros) = between(&noise, &levels, &samples, 0.0)?;
+        let low = levels.iter().copied().fold(f64::INFINITY, f64::min);
+        let high = levels.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        if p >= RULES.moving_zero_p || high - low < RULES.moving_zero_noise * noise.within.sqrt() {
+            return None;
+        }
+        let common = mean(&levels);
+        let mut tared = records.to_vec();
+        for (record, level) in tared.iter_mut().zip(&levels) {
+            subtract(record, level - common);
+        }
+        let by_level = |a: &usize, b: &usize| levels[*a].total_cmp(&levels[*b]);
+        let named = |of: usize| (records[of].name.clone(), levels[of]);
+        let moving = Self {
+            lowest: named((0..levels.len()).min_by(by_level)?),
+            highest: named((0..levels.len()).max_by(by_level)?),
+            zeros,
+            slower: 0.0,
+            by_rests: false,
+        };
+        Some((moving, tared))
+    }
+
     /// As [`MovingZero::of`], but with levels from the second-order response through whole records; returns also
     /// the corrected records. It applies only if the residual of that response is a constant per record plus noise
     /// with almost no memory, because such a constant can only be an offset. Records with y_sd are judged by their
@@ -415,9 +454,7 @@ impl fmt::Display for MovingZero {
         let [lowest, highest] = [lowest, highest].map(|level| significant(*level, digits));
         let where_read = match self.by_rests {
             true => "at rest",
-            false => {
-                "without command (estimated by a second-order response fitted to whole records)"
-            }
+            false => "without command (estimated by a response fitted to whole records)",
         };
         write!(
             f,
@@ -619,6 +656,24 @@ mod tests {
         });
         let y = y.collect();
         Record::new(name, Use::Identify, 0.001, u, y)
+    }
+
+    /// The levels are further apart than y moves, as of a battery at different charges. A misfit of the response does not
+    /// give such levels.
+    #[test]
+    fn levels_further_apart_than_y_moves_are_zeros() {
+        let records = |zeros: [f64; 3], bent| {
+            let holds = [160, 210, 130];
+            let each = zeros.into_iter().zip(holds).zip(["a", "b", "c"]);
+            each.map(|((zero, hold), name)| switched_early(name, zero, bent, hold))
+                .collect::<Vec<Record>>()
+        };
+        let (moving, tared) = MovingZero::by_own_levels(&records([0.0, 3.0, -2.0], true)).unwrap();
+        assert_eq!((&*moving.lowest.0, &*moving.highest.0), ("c", "b"));
+        let apart = moving.highest.1 - moving.lowest.1;
+        assert!((apart - 5.0).abs() < 0.1, "{apart}");
+        assert!(MovingZero::by_own_levels(&tared).is_none());
+        assert!(MovingZero::by_own_levels(&records([0.3; 3], true)).is_none());
     }
 
     #[test]

@@ -352,7 +352,7 @@ fn spoken(value: f64, unit: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::discover::Place;
+    use crate::curves::Place;
     use std::collections::BTreeMap;
 
     #[test]

@@ -4,8 +4,8 @@ use std::fmt::Write as _;
 
 use crate::rules::{Change, ChangeError, Rulebook};
 use crate::{
-    data, delay, design, diagnose, discover, excitation, experiment, fit, identify, model, power,
-    preparation, residual, search, simulate, terms,
+    curves, data, delay, design, diagnose, discover, excitation, experiment, fit, identify, model,
+    power, preparation, residual, search, simulate, terms,
 };
 
 macro_rules! books {
@@ -35,6 +35,7 @@ books!(
     fit,
     residual,
     terms,
+    curves,
     diagnose,
     discover,
     power,

@@ -4,7 +4,9 @@ use super::design::command_after;
 use super::symptom::{effect_in_words, meant, shown};
 use super::{Answer, Tone};
 use crate::data::Plant;
-use crate::diagnose::{Diagnosis, FLOW_LAG, FLOW_MEMORY, HeldOutBy, Memory, RULES, Rung, Verdict};
+use crate::diagnose::{
+    Certificate, Diagnosis, FLOW_LAG, FLOW_MEMORY, HeldOutBy, Memory, RULES, Rung, Verdict,
+};
 use crate::discover::Glance;
 use crate::model::Model;
 use crate::picture::{significant, time};
@@ -61,6 +63,7 @@ pub(super) fn answer(
         ));
     }
     surrogates(&mut answer, diagnosis, plant);
+    curves(&mut answer, diagnosis, plant);
     records(&mut answer, diagnosis, judged_rmse);
     answer.note(bench_check(&diagnosis.sets));
     dynamics(&mut answer, diagnosis);
@@ -73,13 +76,37 @@ pub(super) fn answer(
     answer
 }
 
+/// The surrogates that a curve explains better.
+fn curves(answer: &mut Answer, diagnosis: &Diagnosis, plant: Plant) {
+    for name in &diagnosis.stand_ins {
+        let certificate = diagnosis.certificates.get(name);
+        if let Some(curve) = certificate.and_then(Certificate::better_curve) {
+            answer.note(format!(
+                "{} is not named: a curve at the {} that depends on the {} explains the records as \
+                 well. `discover` fits such curves.",
+                effect_in_words(name, plant),
+                curve.place.word(),
+                on(&curve.coordinate)
+            ));
+        }
+    }
+}
+
+/// A coordinate as a noun.
+fn on(coordinate: &str) -> String {
+    match coordinate.strip_prefix("since ") {
+        Some(edge) => format!("time since {edge}"),
+        None => coordinate.to_owned(),
+    }
+}
+
 /// First-order prediction of a term outside the catalogue, in words.
 pub(super) fn beyond(glance: &Glance) -> String {
     format!(
-        "A first estimate beyond the catalogue: a term at the {} that depends on {} would explain about {:.0} \
-         % of the unexplained variance.",
+        "A first estimate beyond the catalogue: a term at the {} that depends on the {} would explain about \
+         {:.0} % of the unexplained variance.",
         glance.place.word(),
-        glance.coordinate,
+        on(&glance.coordinate),
         glance.error_taken_percent
     )
 }
@@ -198,14 +225,20 @@ fn finding(diagnosis: &Diagnosis, plant: Plant) -> Answer {
         }
         Verdict::PartlyExplained => {
             let own = |name| diagnosis.certificates.get(name);
-            let mut certificates = diagnosis.stand_ins.iter().filter_map(own);
+            let certificates = diagnosis.stand_ins.iter().filter_map(own);
             let unknown = |name: &String| !diagnosis.is_identified(name);
-            let channels = of_channels(diagnosis);
+            // Where a curve of the channel is better, the channel acts at another place.
+            let channels = match certificates.clone().any(|one| one.better_curve().is_some()) {
+                true => &[],
+                false => of_channels(diagnosis),
+            };
             let why = if !channels.is_empty() {
                 "the model was identified without the measured channel, and the cause is decided after it is identified \
                  with the channel"
-            } else if certificates.any(|one| one.evidence_nats < 0.0) {
+            } else if certificates.clone().any(|one| one.evidence_nats < 0.0) {
                 "there is more evidence for a model without them"
+            } else if certificates.clone().any(|one| one.better_curve().is_some()) {
+                "a curve explains the records as well"
             } else if diagnosis.stand_ins.iter().any(unknown) {
                 "the records do not determine their parameters"
             } else {

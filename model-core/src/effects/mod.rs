@@ -10,6 +10,7 @@ pub mod attachment_hysteresis;
 mod bench;
 pub mod bouc_wen_hysteresis;
 pub mod constant_delay;
+pub mod direct_part;
 pub mod dispersed_delay;
 pub mod dry_friction;
 pub mod echo_path;
@@ -223,6 +224,7 @@ catalogue! {
     slow_wake::SlowWake: SlowWake<T>,
     level_rate::LevelRate: LevelRate<T>,
     reading_curve::ReadingCurve: ReadingCurve<T>,
+    direct_part::DirectPart: DirectPart<T>,
     sensor_resonance::SensorResonance: SensorResonance<T>,
     vortex_shedding::VortexShedding: VortexShedding<T>,
     rectifying_sensor::RectifyingSensor: RectifyingSensor,
@@ -255,25 +257,30 @@ pub const LAGGING_DRIVE: &Spec = &<LaggingDrive<f64> as Physics<f64>>::SPEC;
 /// The card of a monotone curve between the flow and its reading, a base term.
 pub const READING_CURVE: &Spec = &<ReadingCurve<f64> as Physics<f64>>::SPEC;
 
+/// The card of a part of the jets that acts on the reading at once, a base term.
+pub const DIRECT_PART: &Spec = &<DirectPart<f64> as Physics<f64>>::SPEC;
+
 /// The card of a sensor that swings, a base term.
 pub const SENSOR_RESONANCE: &Spec = &<SensorResonance<f64> as Physics<f64>>::SPEC;
 
 /// Base terms between command, flow and reading: a search tries each from all starting values of its card.
-pub const PATH_TERMS: [&Spec; 4] = [
+pub const PATH_TERMS: [&Spec; 5] = [
     DISPERSED_DELAY,
     LAGGING_DRIVE,
     READING_CURVE,
+    DIRECT_PART,
     SENSOR_RESONANCE,
 ];
 
 /// The base terms with a card, in their order: after all effects of their place, because a rate acts on everything that
 /// drives the flow; unless their turn is another.
-pub const NUISANCES: [&Spec; 7] = [
+pub const NUISANCES: [&Spec; 8] = [
     DISPERSED_DELAY,
     LAGGING_DRIVE,
     SLOW_WAKE,
     LEVEL_RATE,
     READING_CURVE,
+    DIRECT_PART,
     SENSOR_RESONANCE,
     ZERO_OFFSET,
 ];
@@ -381,6 +388,7 @@ mod tests {
                 "slow-wake",
                 "level-rate",
                 "reading-curve",
+                "direct-part",
                 "sensor-resonance",
                 "zero-offset",
                 "constant-delay",

@@ -4,7 +4,7 @@ use numerics::linalg::{dot, gram, solve_symmetric};
 
 /// Dimension of a parameter of a form.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Kind {
+pub(crate) enum Kind {
     /// Dimension of g/xⁿ, with this n.
     Amplitude(i32),
     /// Dimension of g/√x.
@@ -19,14 +19,14 @@ pub(super) enum Kind {
 
 /// A parameter of a form.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Card {
-    pub(super) name: &'static str,
+pub(crate) struct Card {
+    pub(crate) name: &'static str,
     kind: Kind,
 }
 
 impl Card {
     /// Search interval of the parameter, given an initial value and the extent of x.
-    pub(super) fn range(&self, value: f64, x: [f64; 2]) -> [f64; 2] {
+    pub(crate) fn range(&self, value: f64, x: [f64; 2]) -> [f64; 2] {
         let extent = (x[1] - x[0]).max(f64::MIN_POSITIVE);
         match self.kind {
             Kind::Amplitude(_) | Kind::OverRoot => {
@@ -40,7 +40,7 @@ impl Card {
     }
 
     /// Unit of the parameter, given those of g and x.
-    pub(super) fn unit(&self, of_g: &'static str, of_x: &'static str) -> &'static str {
+    pub(crate) fn unit(&self, of_g: &'static str, of_x: &'static str) -> &'static str {
         match self.kind {
             Kind::Amplitude(0) => of_g,
             Kind::Place | Kind::Width => of_x,
@@ -52,14 +52,14 @@ impl Card {
 
 /// A standard function: linear in its amplitudes, which come first, with up to two nonlinear parameters.
 #[derive(Debug)]
-pub(super) struct Form {
+pub(crate) struct Form {
     /// As an expression of `{x}`.
-    pub(super) expression: &'static str,
+    pub(crate) expression: &'static str,
     /// Parameters of the formula, amplitudes first.
-    pub(super) parameters: &'static [Card],
+    pub(crate) parameters: &'static [Card],
     amplitudes: usize,
     /// g at x for these parameters.
-    pub(super) value: fn(f64, &[f64]) -> f64,
+    pub(crate) value: fn(f64, &[f64]) -> f64,
     /// Whether the formula is defined for x ≥ 0 only.
     positive: bool,
 }
@@ -82,7 +82,7 @@ const fn width(name: &'static str) -> Card {
 }
 
 /// The forms, in ascending number of parameters.
-pub(super) static FORMS: [Form; 14] = [
+pub(crate) static FORMS: [Form; 14] = [
     Form {
         expression: "amplitude * {x}",
         parameters: &[amplitude(1)],
@@ -217,12 +217,12 @@ impl PartialEq for Form {
 
 impl Form {
     /// Whether one amplitude of the form is a constant.
-    pub(super) fn has_level(&self) -> bool {
+    pub(crate) fn has_level(&self) -> bool {
         self.parameters.iter().any(|card| card.name == "offset")
     }
 
     /// Parameters in other units of x and g.
-    pub(super) fn scaled(&self, parameters: &[f64], of_x: f64, of_g: f64) -> Vec<f64> {
+    pub(crate) fn scaled(&self, parameters: &[f64], of_x: f64, of_g: f64) -> Vec<f64> {
         let pairs = self.parameters.iter().zip(parameters);
         pairs
             .map(|(card, value)| match card.kind {
@@ -236,7 +236,7 @@ impl Form {
 
     /// Least-squares parameters for the points of a curve, and the remaining mean square; with `free_level`, up to a
     /// constant. `None` if the form is not defined at these points.
-    pub(super) fn nearest(
+    pub(crate) fn nearest(
         &self,
         x: &[f64],
         g: &[f64],

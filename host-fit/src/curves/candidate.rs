@@ -8,16 +8,16 @@ use crate::terms::{self, Hypothesis, Judged};
 
 /// A fully fitted term with its model.
 #[derive(Clone)]
-pub(super) struct Candidate {
+pub(crate) struct Candidate {
     /// The term as a piecewise-linear curve.
-    pub(super) term: Term,
-    pub(super) with: Hypothesis,
+    pub(crate) term: Term,
+    pub(crate) with: Hypothesis,
     /// The term as a formula, if one was tried and fits equally well.
-    pub(super) formula: Option<(Term, Judged)>,
+    pub(crate) formula: Option<(Term, Judged)>,
 }
 
 impl Candidate {
-    pub(super) fn of(term: Term, with: Hypothesis) -> Self {
+    pub(crate) fn of(term: Term, with: Hypothesis) -> Self {
         Self {
             term: term.in_model(with.judged.model()),
             with,
@@ -36,13 +36,13 @@ impl Candidate {
     }
 
     /// The model with the curve or formula that is reported.
-    pub(super) fn judged(&self) -> &Judged {
+    pub(crate) fn judged(&self) -> &Judged {
         self.told().1
     }
 
     /// ln of the validation error plus the penalty of the model's parameters and of a chosen (not fitted)
     /// time constant.
-    pub(super) fn size(&self) -> f64 {
+    pub(crate) fn size(&self) -> f64 {
         let (term, judged) = self.told();
         let chosen = if term.has_chosen_time() {
             terms::RULES.price
@@ -52,27 +52,27 @@ impl Candidate {
         judged.size() + chosen
     }
 
-    pub(super) fn place(&self) -> Place {
+    pub(crate) fn place(&self) -> Place {
         self.term.entry.place()
     }
 
     /// Whether one term depends on the pulse length and the other on the time since the edge: these are equal during a
     /// pulse.
-    pub(super) fn is_twin(&self, other: &Self) -> bool {
+    pub(crate) fn is_twin(&self, other: &Self) -> bool {
         let ratio = self.with.judged.rmse() / other.with.judged.rmse();
         self.term.entry == other.term.entry && ratio - 1.0 < RULES.twins
     }
 }
 
 /// Removes and returns the best of some candidates.
-pub(super) fn best(all: &mut Vec<Candidate>) -> Option<Candidate> {
+pub(crate) fn best(all: &mut Vec<Candidate>) -> Option<Candidate> {
     let smaller = |a: &usize, b: &usize| all[*a].size().total_cmp(&all[*b].size());
     let index = (0..all.len()).min_by(smaller)?;
     Some(all.swap_remove(index))
 }
 
 /// Indices of the best candidate of each place, after sorting all from best to worst.
-pub(super) fn best_of_each_place(all: &mut [Candidate]) -> Vec<usize> {
+pub(crate) fn best_of_each_place(all: &mut [Candidate]) -> Vec<usize> {
     order::ascending(all, Candidate::size);
     let new = |i: &usize| {
         all[..*i]

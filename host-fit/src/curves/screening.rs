@@ -14,20 +14,20 @@ use crate::user_effect::Definition;
 use model_core::effects::ZERO_OFFSET;
 
 /// A curve that was screened.
-pub(super) struct Screened {
+pub(crate) struct Screened {
     /// The term with the predicted values.
-    pub(super) term: Term,
+    pub(crate) term: Term,
     /// ½ ln of the predicted validation mean square over the present one, plus the penalty of its points; negative
     /// if the gain exceeds the penalty.
-    pub(super) score: f64,
+    pub(crate) score: f64,
     /// Explained share of the validation error energy.
-    pub(super) held_out: f64,
+    pub(crate) held_out: f64,
     /// Rms value that the term would need to be worth reporting.
-    pub(super) smallest: f64,
+    pub(crate) smallest: f64,
 }
 
 /// Above this level the command counts as on, inner units.
-pub(super) const ON: f64 = 0.5;
+pub(crate) const ON: f64 = 0.5;
 /// Bounds of the flow's time constant, s at 1 kHz (1000 samples). The time constants of coordinates are multiples of
 /// the flow's.
 const FASTEST_S: f64 = 0.005;
@@ -65,7 +65,7 @@ fn values_of(coordinate: &Coordinate, model: &Model, records: &[&Record]) -> Opt
 }
 
 /// The mean of the channel that a coordinate reads.
-pub(super) fn reference(coordinate: &Coordinate, records: &[&Record]) -> Option<f64> {
+pub(crate) fn reference(coordinate: &Coordinate, records: &[&Record]) -> Option<f64> {
     let channel = coordinate.channel()?;
     let values = || {
         let series = records.iter().filter_map(|r| r.channels.get(channel));
@@ -136,7 +136,7 @@ fn points(mut weighted: Vec<(f64, f64)>) -> Option<(Vec<f64>, usize)> {
 
 /// Time by which the model's own delay is shortened for a term of the delay, s, so that the term
 /// can also shorten the delay.
-pub(super) fn room(entry: Entry, model: &Model) -> f64 {
+pub(crate) fn room(entry: Entry, model: &Model) -> f64 {
     match entry {
         Entry::Delay => {
             let period = model.sample_period_s;
@@ -148,7 +148,7 @@ pub(super) fn room(entry: Entry, model: &Model) -> f64 {
 }
 
 /// A model on which curves are screened.
-pub(super) struct Context<'a> {
+pub(crate) struct Context<'a> {
     screen: Screen<'a>,
     model: &'a Model,
     learning: Vec<&'a Record>,
@@ -160,7 +160,7 @@ pub(super) struct Context<'a> {
 
 impl<'a> Context<'a> {
     /// Prepares the model; `None` if it diverges.
-    pub(super) fn new(search: &Search<'a>, model: &'a Model, number: usize) -> Option<Self> {
+    pub(crate) fn new(search: &Search<'a>, model: &'a Model, number: usize) -> Option<Self> {
         let learning = search.judge.learning(0);
         let longest = learning.iter().map(|r| r.len()).max().unwrap_or(0) as f64;
         Some(Self {
@@ -173,12 +173,12 @@ impl<'a> Context<'a> {
     }
 
     /// All curves that enter the model at one of these `entries`, the most promising first.
-    pub(super) fn all(&self, entries: &[Entry]) -> Vec<Screened> {
+    pub(crate) fn all(&self, entries: &[Entry]) -> Vec<Screened> {
         self.curves(self.coordinates(), entries)
     }
 
     /// Screens all coordinates with a finer grid of time constants.
-    pub(super) fn closer(&self, entries: &[Entry]) -> Vec<Screened> {
+    pub(crate) fn closer(&self, entries: &[Entry]) -> Vec<Screened> {
         let mut all = self.coordinates();
         let between: Vec<_> = all
             .iter()
@@ -207,7 +207,7 @@ impl<'a> Context<'a> {
     }
 
     /// This term with neighbouring time constants, if its own was chosen from a grid.
-    pub(super) fn near(&self, term: &Term) -> Vec<Screened> {
+    pub(crate) fn near(&self, term: &Term) -> Vec<Screened> {
         if term.fading.is_some() {
             return Vec::new();
         }
@@ -215,14 +215,14 @@ impl<'a> Context<'a> {
     }
 
     /// First-order change of the free run by a term.
-    pub(super) fn direction(&self, term: &Term) -> Option<Vec<f64>> {
+    pub(crate) fn direction(&self, term: &Term) -> Option<Vec<f64>> {
         let reference = reference(&term.coordinate, &self.learning);
         let with = term.added_to(self.model, reference)?;
         Some(self.screen.tangent(&with, &term.name())?.direction)
     }
 
     /// The screening of the model.
-    pub(super) fn screen(&self) -> &Screen<'a> {
+    pub(crate) fn screen(&self) -> &Screen<'a> {
         &self.screen
     }
 
@@ -320,7 +320,7 @@ impl<'a> Context<'a> {
 }
 
 /// The first `most` candidates, limited per kind by the rules.
-pub(super) fn diverse(all: Vec<Screened>, most: usize) -> Vec<Screened> {
+pub(crate) fn diverse(all: Vec<Screened>, most: usize) -> Vec<Screened> {
     let mut kept: Vec<Screened> = Vec::new();
     for one in all {
         let of_a_kind = kept.iter().filter(|other| other.term.is_like(&one.term));

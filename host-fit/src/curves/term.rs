@@ -13,7 +13,7 @@ use std::fmt::Write as _;
 
 /// The function g of the coordinate.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) enum Shape {
+pub(crate) enum Shape {
     /// Piecewise linear. Where the base already contains a constant g, one value is fixed at 0.
     Points {
         x: Vec<f64>,
@@ -31,21 +31,21 @@ pub(super) enum Shape {
 
 /// A term outside the catalogue.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Term {
-    pub(super) entry: Entry,
-    pub(super) coordinate: Coordinate,
-    pub(super) shape: Shape,
+pub(crate) struct Term {
+    pub(crate) entry: Entry,
+    pub(crate) coordinate: Coordinate,
+    pub(crate) shape: Shape,
     /// Search interval of the coordinate's filter time constant, s, if that is a parameter.
-    pub(super) fading: Option<[f64; 2]>,
+    pub(crate) fading: Option<[f64; 2]>,
     /// Above this level the command counts as on.
-    pub(super) on: f64,
+    pub(crate) on: f64,
     /// Time by which the model's own delay is shortened, s, so that the term can also shorten the
     /// delay.
-    pub(super) shift: f64,
+    pub(crate) shift: f64,
     /// Inner unit of time, s.
-    pub(super) time: f64,
+    pub(crate) time: f64,
     /// Number of the term among those of its kind.
-    pub(super) number: usize,
+    pub(crate) number: usize,
 }
 
 /// A parameter of an effect file and its unit conversion.
@@ -59,17 +59,17 @@ struct Parameter {
 
 impl Term {
     /// Whether two terms have the same entry, and the same coordinate except for its time constant.
-    pub(super) fn is_like(&self, other: &Self) -> bool {
+    pub(crate) fn is_like(&self, other: &Self) -> bool {
         self.entry == other.entry && self.coordinate.slug() == other.coordinate.slug()
     }
 
     /// Whether the term's coordinate has a time constant that was chosen from a grid and is not fitted.
-    pub(super) fn has_chosen_time(&self) -> bool {
+    pub(crate) fn has_chosen_time(&self) -> bool {
         self.coordinate.has_time() && self.fading.is_none()
     }
 
     /// The term with the coordinate's filter time constant, if any, as a parameter within `factor`.
-    pub(super) fn with_free_time(self, factor: f64) -> Self {
+    pub(crate) fn with_free_time(self, factor: f64) -> Self {
         let time = self.coordinate.fading();
         Self {
             fading: time.map(|time| [time / factor, time * factor]),
@@ -78,7 +78,7 @@ impl Term {
     }
 
     /// Standard errors of the values of a curve in a fitted model; 0 where a value is fixed.
-    pub(super) fn errors(&self, fitted: &Fit) -> Vec<f64> {
+    pub(crate) fn errors(&self, fitted: &Fit) -> Vec<f64> {
         let Shape::Points { g, pinned, .. } = &self.shape else {
             return Vec::new();
         };
@@ -97,7 +97,7 @@ impl Term {
     }
 
     /// Name of the term's effect.
-    pub(super) fn name(&self) -> String {
+    pub(crate) fn name(&self) -> String {
         let entry = match self.entry {
             Entry::Jet => "jet",
             Entry::Delay => "delay",
@@ -116,7 +116,7 @@ impl Term {
     }
 
     /// The term in the user's units.
-    pub(super) fn out(&self, units: &Units) -> Self {
+    pub(crate) fn out(&self, units: &Units) -> Self {
         let (of_x, of_g) = (self.coordinate.scale(units), self.entry.scale(units));
         let scaled = |values: &[f64], scale: f64| values.iter().map(|v| v * scale).collect();
         let shape = match &self.shape {
@@ -146,7 +146,7 @@ impl Term {
     }
 
     /// g as an expression in an effect file.
-    pub(super) fn formula(&self) -> String {
+    pub(crate) fn formula(&self) -> String {
         let x = self.coordinate.expression();
         match &self.shape {
             Shape::Formula { form, .. } => form.expression.replace("{x}", &x),
@@ -214,13 +214,13 @@ impl Term {
     }
 
     /// Parameter values of the term's effect.
-    pub(super) fn values(&self) -> Vec<f64> {
+    pub(crate) fn values(&self) -> Vec<f64> {
         self.parameters().iter().map(|p| p.value).collect()
     }
 
     /// The curve with more points where it is steepest relative to its standard `errors`. If there are too many points,
     /// those collinear with their neighbours are removed. `None` if nothing changes.
-    pub(super) fn finer(&self, errors: &[f64]) -> Option<Self> {
+    pub(crate) fn finer(&self, errors: &[f64]) -> Option<Self> {
         let Shape::Points { x, g, pinned } = &self.shape else {
             return None;
         };
@@ -263,7 +263,7 @@ impl Term {
     }
 
     /// The term with other parameter values.
-    pub(super) fn with_values(&self, values: &[f64]) -> Self {
+    pub(crate) fn with_values(&self, values: &[f64]) -> Self {
         let mut other = self.clone();
         let own: Vec<&mut f64> = match &mut other.shape {
             Shape::Points { g, pinned, .. } => {
@@ -284,7 +284,7 @@ impl Term {
     }
 
     /// The term as an effect file, which starts with the lines of `comment`.
-    pub(super) fn file(&self, comment: &str) -> String {
+    pub(crate) fn file(&self, comment: &str) -> String {
         let longest = self.shift + RULES.longest_delay_s * self.time;
         let mut text = String::new();
         for line in comment.lines() {
@@ -330,13 +330,13 @@ impl Term {
     }
 
     /// Definition of the term as an effect file.
-    pub(super) fn definition(&self) -> Result<&'static Definition, DefinitionError> {
+    pub(crate) fn definition(&self) -> Result<&'static Definition, DefinitionError> {
         Definition::from_toml(&self.file(""), &self.name())
     }
 
     /// The model with the term; `reference` is the reference of its channel. `None` if the model has an effect of the
     /// same name.
-    pub(super) fn added_to(&self, model: &Model, reference: Option<f64>) -> Option<Model> {
+    pub(crate) fn added_to(&self, model: &Model, reference: Option<f64>) -> Option<Model> {
         let mut model = model.clone();
         let definition = self.definition().ok()?;
         if model.has_effect(&self.name()) {
@@ -349,7 +349,7 @@ impl Term {
     }
 
     /// The model without the term.
-    pub(super) fn taken_from(&self, model: &Model) -> Model {
+    pub(crate) fn taken_from(&self, model: &Model) -> Model {
         let mut model = model.clone();
         let name = self.name();
         model.effects.retain(|added| added.name != name);
@@ -359,7 +359,7 @@ impl Term {
     }
 
     /// The term with the values of a model that contains it.
-    pub(super) fn in_model(&self, model: &Model) -> Self {
+    pub(crate) fn in_model(&self, model: &Model) -> Self {
         let name = self.name();
         let own = model.effects.iter().find(|added| added.name == name);
         own.map_or_else(|| self.clone(), |own| self.with_values(&own.parameters))

@@ -39,16 +39,16 @@ pub enum Coordinate {
 }
 
 /// A state variable of an effect file.
-pub(super) struct State {
-    pub(super) name: &'static str,
-    pub(super) start: f64,
-    pub(super) update: String,
+pub(crate) struct State {
+    pub(crate) name: &'static str,
+    pub(crate) start: f64,
+    pub(crate) update: String,
 }
 
 /// Time assumed since the last edge before the record: 10 000 samples, i.e. 10 s at 1 kHz.
 const LONG_AGO_S: f64 = 10.0;
 /// Parameter name of a fitted filter time constant.
-pub(super) const FADING: &str = "fading_time";
+pub(crate) const FADING: &str = "fading_time";
 
 impl Coordinate {
     /// The coordinate in words, as in documents.
@@ -75,7 +75,7 @@ impl Coordinate {
     }
 
     /// Words of the coordinate without times, joined by `-`: part of a term's name.
-    pub(super) fn slug(&self) -> String {
+    pub(crate) fn slug(&self) -> String {
         let words = self.words();
         let kind = words.split(" (").next().unwrap_or(&words);
         let kind = kind.split(" in the last").next().unwrap_or(kind);
@@ -109,7 +109,7 @@ impl Coordinate {
     }
 
     /// One inner unit of the coordinate in the user's units.
-    pub(super) fn scale(&self, units: &Units) -> f64 {
+    pub(crate) fn scale(&self, units: &Units) -> f64 {
         match self {
             Self::MemoryOfU(_) => 1.0,
             Self::MemoryOfRate(_) => units.y / units.time,
@@ -119,7 +119,7 @@ impl Coordinate {
     }
 
     /// The coordinate in the user's units.
-    pub(super) fn out(&self, units: &Units) -> Self {
+    pub(crate) fn out(&self, units: &Units) -> Self {
         let mut other = self.clone();
         if let Some(time) = other.time_mut() {
             *time *= units.time;
@@ -140,7 +140,7 @@ impl Coordinate {
     }
 
     /// Whether the coordinate's memory is at most `longest`.
-    pub(super) fn fits(&self, longest: f64) -> bool {
+    pub(crate) fn fits(&self, longest: f64) -> bool {
         match self {
             Self::PastY(t) | Self::MeanY(t) | Self::Blowing(t) => *t <= longest,
             _ => true,
@@ -148,19 +148,19 @@ impl Coordinate {
     }
 
     /// Whether the coordinate has a time constant from a grid.
-    pub(super) fn has_time(&self) -> bool {
+    pub(crate) fn has_time(&self) -> bool {
         self.clone().time_mut().is_some()
     }
 
     /// The coordinate with its time constant multiplied by `factor`; `None` without a time constant.
-    pub(super) fn with_time_times(&self, factor: f64) -> Option<Self> {
+    pub(crate) fn with_time_times(&self, factor: f64) -> Option<Self> {
         let mut other = self.clone();
         *other.time_mut()? *= factor;
         Some(other)
     }
 
     /// Time constant of the coordinate's filter, if that can be fitted.
-    pub(super) fn fading(&self) -> Option<f64> {
+    pub(crate) fn fading(&self) -> Option<f64> {
         match self {
             Self::MemoryOfU(t) | Self::MemoryOfY(t) | Self::MemoryOfRate(t) => Some(*t),
             _ => None,
@@ -168,7 +168,7 @@ impl Coordinate {
     }
 
     /// The coordinate with another filter time constant.
-    pub(super) fn with_fading(&self, time: f64) -> Self {
+    pub(crate) fn with_fading(&self, time: f64) -> Self {
         let mut other = self.clone();
         if self.fading().is_some()
             && let Some(own) = other.time_mut()
@@ -179,7 +179,7 @@ impl Coordinate {
     }
 
     /// Name of the channel that the coordinate reads.
-    pub(super) fn channel(&self) -> Option<&str> {
+    pub(crate) fn channel(&self) -> Option<&str> {
         match self {
             Self::Channel(name) => Some(name),
             _ => None,
@@ -187,7 +187,7 @@ impl Coordinate {
     }
 
     /// The coordinate as an expression of an effect file.
-    pub(super) fn expression(&self) -> String {
+    pub(crate) fn expression(&self) -> String {
         match self {
             Self::Y => "y".to_owned(),
             Self::Reading => "reading".to_owned(),
@@ -207,7 +207,7 @@ impl Coordinate {
 
     /// State variables of the coordinate. The command counts as on above `on`; with `fitted`, the time constant is a
     /// parameter.
-    pub(super) fn states(&self, on: f64, time: f64, fitted: bool) -> Vec<State> {
+    pub(crate) fn states(&self, on: f64, time: f64, fitted: bool) -> Vec<State> {
         let rises = format!("u > {on:?} && was_on < 0.5");
         let falls = format!("u <= {on:?} && was_on > 0.5");
         let long_ago = LONG_AGO_S * time;
@@ -275,13 +275,13 @@ impl Coordinate {
 }
 
 /// Longest memory in records of `longest` seconds, both at 1 kHz.
-pub(super) fn remembered(longest: f64) -> f64 {
+pub(crate) fn remembered(longest: f64) -> f64 {
     (0.25 * longest).min(2.0)
 }
 
 /// All coordinates to screen: time constants are multiples of the flow's, limited by the record length
 /// `longest` in seconds.
-pub(super) fn coordinates(
+pub(crate) fn coordinates(
     time_constant: f64,
     longest: f64,
     channels: &[String],

@@ -1,5 +1,6 @@
 //! Places at which a term can act, and the quantity that it changes there.
 
+use super::coordinate::Coordinate;
 use crate::terms::Units;
 use model_core::effect::Unit;
 use serde::Serialize;
@@ -83,6 +84,16 @@ impl Entry {
         }
     }
 
+    /// The coordinate of a term at this entry, in words. A rate and a sensitivity also act in proportion to y.
+    pub(crate) fn depends_on(self, coordinate: &Coordinate) -> String {
+        let own = coordinate.words();
+        match self {
+            Self::Rate if own != "y" => format!("{own} × y"),
+            Self::Sensitivity if own != "reading" => format!("{own} × reading"),
+            _ => own,
+        }
+    }
+
     /// The unit of g.
     #[must_use]
     pub fn unit(self) -> Unit {
@@ -94,18 +105,18 @@ impl Entry {
     }
 
     /// One inner unit of g in the user's units.
-    pub(super) fn scale(self, units: &Units) -> f64 {
+    pub(crate) fn scale(self, units: &Units) -> f64 {
         self.unit().scale(units.y, units.time, 1.0)
     }
 
     /// Whether the base already contains a constant g.
-    pub(super) fn has_free_level(self) -> bool {
+    pub(crate) fn has_free_level(self) -> bool {
         !matches!(self, Self::Level | Self::Reading)
     }
 
     /// Weight of a sample for estimating g. A term of the jet shows only while a jet is blowing. A
     /// term that multiplies y has the weight y².
-    pub(super) fn shown_by(self, blowing: bool, y: f64) -> f64 {
+    pub(crate) fn shown_by(self, blowing: bool, y: f64) -> f64 {
         match self {
             Self::Jet => f64::from(u8::from(blowing)),
             Self::Rate | Self::Sensitivity => y * y,
@@ -114,7 +125,7 @@ impl Entry {
     }
 
     /// The place in an effect file.
-    pub(super) fn of_effect(self) -> &'static str {
+    pub(crate) fn of_effect(self) -> &'static str {
         match self {
             Self::Jet | Self::Delay => "jet",
             Self::Level | Self::Rate => "flow",
@@ -124,7 +135,7 @@ impl Entry {
 
     /// The expression of an effect with this `g`. The model's delay was shortened by `shift` seconds to make
     /// room, and may become `longest` at most. A full jet has the strength `full`.
-    pub(super) fn expression(self, g: &str, shift: f64, longest: f64, full: f64) -> String {
+    pub(crate) fn expression(self, g: &str, shift: f64, longest: f64, full: f64) -> String {
         match self {
             Self::Jet => format!("jet * (1.0 + ({g}))"),
             Self::Delay => format!("delayed(jet, {shift:?} + ({g}), {longest:?})"),

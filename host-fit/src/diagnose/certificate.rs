@@ -346,6 +346,7 @@ fn is_same(a: &Hypothesis, b: &Hypothesis) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::curves::Place;
     use crate::diagnose::Options;
     use crate::residual::plants::{base, records};
     use crate::terms::{Bench, Search};
@@ -411,6 +412,29 @@ mod tests {
         assert!((p_value(50.0_f64.ln()) - 0.02).abs() < 1e-12);
         assert_eq!(p_value(-3.0), 1.0);
         assert!(p_value(1e4) > 0.0);
+    }
+
+    /// Evidence against other models does not suffice if a curve explains the records as well.
+    #[test]
+    fn a_better_curve_prevents_a_certificate() {
+        let against = |evidence_nats: f64| Certificate {
+            evidence_nats: 223.0,
+            log_e: 220.0,
+            alpha: 0.02,
+            records: Vec::new(),
+            share: 0.9,
+            curve: Some(Curve {
+                place: Place::Flow,
+                coordinate: "wind".to_owned(),
+                evidence_nats,
+            }),
+        };
+        assert!(against(34.0).holds() && against(34.0).better_curve().is_none());
+        for nats in [3.0, -170.0] {
+            let certificate = against(nats);
+            assert!(!certificate.holds() && !certificate.holds_beside_others());
+            assert_eq!(certificate.better_curve(), certificate.curve.as_ref());
+        }
     }
 
     #[test]

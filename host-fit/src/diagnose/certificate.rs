@@ -215,7 +215,7 @@ impl Session<'_> {
     /// largest evidence of the models that contain neither the effect, nor another member of its equivalence set, nor an
     /// effect that reads the same channel. A model without the effect may have more evidence than `subject` because of
     /// its other terms; the effect is therefore also added to such models. `against_curves`: whether effects are also
-    /// compared with curves if `subject` is above the noise level.
+    /// compared with curves if `subject` is above the noise level, or the noise level is unknown.
     pub(super) fn certificates(
         &self,
         subject: &Hypothesis,
@@ -270,7 +270,9 @@ impl Session<'_> {
         let nulls: Vec<Option<Null>> = parallel::each(&distinct, |null| self.null(null));
         let model = subject.judged.model();
         let own = self.evidence_of(model);
-        let against_curves = against_curves && !self.is_at_noise(&subject.judged.held_out);
+        let noise_is_known = self.judge().noise_source != NoiseSource::Scatter;
+        let is_at_noise = noise_is_known && self.is_at_noise(&subject.judged.held_out);
+        let against_curves = against_curves && !is_at_noise;
         let certificates = effects.into_iter().filter_map(|(term, lesser, places)| {
             let name = term.effect()?.name;
             // If the evidence of a null model is unknown, nothing is certified.

@@ -66,15 +66,26 @@ impl Preparation {
         if prepared.moving_zero.is_some() {
             return prepared;
         }
+        // Where the levels of records differ by more than a response moves y, no record seems to rest.
+        let moved = |moving: MovingZero, tared: &[Record]| Self {
+            moving_zero: Some(moving),
+            ..Self::as_read(tared)
+        };
+        let begins_at_rest =
+            |prepared: &Self| prepared.records.iter().all(|r| r.followed.is_empty());
+        if !begins_at_rest(&prepared)
+            && let Some((moving, tared)) = MovingZero::by_own_levels(records)
+        {
+            let with_own = moved(moving, &tared);
+            if begins_at_rest(&with_own) {
+                return with_own;
+            }
+        }
         // If rests are too short to distinguish an offset from a relaxation, offsets are estimated by the response
         // through whole records.
-        let tared = MovingZero::by_own_levels(records).or_else(|| MovingZero::by_response(records));
-        let Some((moving, tared)) = tared else {
-            return prepared;
-        };
-        Self {
-            moving_zero: Some(moving),
-            ..Self::as_read(&tared)
+        match MovingZero::by_response(records) {
+            Some((moving, tared)) => moved(moving, &tared),
+            None => prepared,
         }
     }
 

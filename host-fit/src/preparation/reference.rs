@@ -59,16 +59,13 @@ struct Moments {
 }
 
 impl Moments {
-    /// The moments after projecting out a constant as well.
-    fn without_level(&self) -> Self {
-        Self {
-            one: 0.0,
-            x: 0.0,
-            y: 0.0,
-            xx: self.xx - self.x * self.x / self.one,
-            xy: self.xy - self.x * self.y / self.one,
-            yy: self.yy - self.y * self.y / self.one,
-        }
+    /// Σ x·x, Σ x·y and Σ y·y after projecting out a constant as well.
+    fn without_level(&self) -> [f64; 3] {
+        [
+            self.xx - self.x * self.x / self.one,
+            self.xy - self.x * self.y / self.one,
+            self.yy - self.y * self.y / self.one,
+        ]
     }
 }
 
@@ -86,9 +83,7 @@ impl FirstOrder {
     /// Fits the response to `records` by least squares over a refined grid; `None` if y does not follow u.
     #[must_use]
     pub fn fitted(records: &[Record]) -> Option<Self> {
-        let total: usize = records.iter().map(Record::len).sum();
-        let stride = total.div_ceil(RULES.reference_samples).max(1);
-        let thinned: Vec<Thinned> = records.iter().map(|r| Thinned::of(r, stride)).collect();
+        let (thinned, stride) = thinned(records);
         let whole = whole_spread(&thinned);
         if !(whole > 0.0 && whole.is_finite()) {
             return None;
@@ -115,15 +110,13 @@ impl FirstOrder {
             level,
             explained,
             left_rms: rms(left, thinned.iter().map(|r| r.y.len()).sum()),
-            varying_rms: rms(varying.sum(), total),
+            varying_rms: rms(varying.sum(), records.iter().map(Record::len).sum()),
         })
     }
 
     /// The level of each record in a response with a level for each record; `None` if there is no such response.
     pub(super) fn own_levels(records: &[Record]) -> Option<Vec<OwnLevel>> {
-        let total: usize = records.iter().map(Record::len).sum();
-        let stride = total.div_ceil(RULES.reference_samples).max(1);
-        let thinned: Vec<Thinned> = records.iter().map(|r| Thinned::of(r, stride)).collect();
+        let (thinned, stride) = thinned(records);
         let of = |records: &[Thinned], delay: f64, time: f64| -> Vec<Moments> {
             records
                 .iter()
@@ -132,8 +125,8 @@ impl FirstOrder {
         };
         let gain = |all: &[Moments]| {
             let within = all.iter().map(Moments::without_level);
-            let (xx, xy, yy) = within.fold((0.0, 0.0, 0.0), |(xx, xy, yy), own| {
-                (xx + own.xx, xy + own.xy, yy + own.yy)
+            let [xx, xy, yy] = within.fold([0.0; 3], |sums, own| {
+                [sums[0] + own[0], sums[1] + own[1], sums[2] + own[2]]
             });
             (xy / xx, yy - xy * xy / xx)
         };
@@ -179,6 +172,14 @@ impl FirstOrder {
     pub fn at_rest(&self, u: f64) -> f64 {
         self.level + self.gain * u
     }
+}
+
+/// The records with neighbouring samples averaged so that few enough remain, and the number averaged.
+fn thinned(records: &[Record]) -> (Vec<Thinned>, usize) {
+    let total: usize = records.iter().map(Record::len).sum();
+    let stride = total.div_ceil(RULES.reference_samples).max(1);
+    let each = records.iter().map(|r| Thinned::of(r, stride));
+    (each.collect(), stride)
 }
 
 /// The delay and the time constant with the least residual over a refined grid, and that residual.

@@ -65,10 +65,17 @@ pub(crate) fn refitted(
     beside: &Hypothesis,
     curves: Vec<Screened>,
 ) -> Vec<Candidate> {
-    finished(
-        search,
-        parallel::some(curves, |curve| tried(search, beside, curve)),
-    )
+    followed(search, briefly(search, beside, curves))
+}
+
+/// One model with each of these curves, fitted for a few iterations, the best first.
+pub(crate) fn briefly(
+    search: &Search<'_>,
+    beside: &Hypothesis,
+    curves: Vec<Screened>,
+) -> Vec<Tried> {
+    let each = parallel::some(curves, |curve| tried(search, beside, curve));
+    rated(search, each)
 }
 
 /// A model with the term, fitted for a few iterations. The fit starts with the term at 0 if its predicted values
@@ -119,7 +126,7 @@ pub(crate) fn tried(search: &Search<'_>, beside: &Hypothesis, curve: Screened) -
 }
 
 /// Brief fits by their validation error, the best first; without those that diverge.
-pub(crate) fn rated(search: &Search<'_>, tried: Vec<Tried>) -> Vec<Tried> {
+fn rated(search: &Search<'_>, tried: Vec<Tried>) -> Vec<Tried> {
     let mut rated: Vec<(f64, Tried)> = parallel::some(tried, |tried| {
         let rmse = search.judge.held_out(|_| &tried.brief.model).ok()?.rmse();
         Some((terms::size(rmse, &tried.brief.model), tried))
@@ -131,8 +138,11 @@ pub(crate) fn rated(search: &Search<'_>, tried: Vec<Tried>) -> Vec<Tried> {
 /// The best of some brief fits, refitted in full. The refit also moves the lags of the base, which had imitated the
 /// missing term.
 pub(crate) fn finished(search: &Search<'_>, tried: Vec<Tried>) -> Vec<Candidate> {
+    followed(search, rated(search, tried))
+}
+
+fn followed(search: &Search<'_>, mut rated: Vec<Tried>) -> Vec<Candidate> {
     let mut heirs = Heirs::of(RULES.finished);
-    let mut rated = rated(search, tried);
     rated.retain(|tried| heirs.takes(kind(&tried.term, &tried.memory, &tried.brief.model)));
     parallel::some(rated, |tried| {
         let least = tried.memory.len();

@@ -11,7 +11,7 @@ mod term;
 
 pub(crate) use candidate::{Candidate, best, best_of_each_place};
 pub use coordinate::Coordinate;
-pub(crate) use fits::{Heirs, finished, kind, rated, refitted, tried};
+pub(crate) use fits::{Heirs, briefly, finished, kind, refitted, tried};
 pub(crate) use formula::FORMS;
 pub use place::{Entry, Place};
 pub use rules::{RULES, Rules};

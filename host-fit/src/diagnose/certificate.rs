@@ -34,8 +34,8 @@ pub struct Certificate {
     /// imitate the effect with more parameters and less evidence do not count.
     #[serde(skip)]
     pub share: f64,
-    /// The best curve in place of the effect, if the model is above the noise level and the effect has evidence against
-    /// all other models.
+    /// The best curve in place of the effect. Computed if the model is above the noise level or that level is unknown, and
+    /// the effect has enough evidence against all other models.
     pub curve: Option<Curve>,
 }
 
@@ -215,7 +215,8 @@ impl Session<'_> {
     /// largest evidence of the models that contain neither the effect, nor another member of its equivalence set, nor an
     /// effect that reads the same channel. A model without the effect may have more evidence than `subject` because of
     /// its other terms; the effect is therefore also added to such models. `against_curves`: whether effects are also
-    /// compared with curves if `subject` is above the noise level, or the noise level is unknown.
+    /// compared with curves
+    /// (if `subject` is above the noise level, or that level is unknown).
     pub(super) fn certificates(
         &self,
         subject: &Hypothesis,

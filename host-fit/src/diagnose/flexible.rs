@@ -2,12 +2,12 @@
 //! catalogue: it must explain the records better than any curve of a coordinate.
 
 use super::session::Session;
-use crate::curves::{self, Context, Entry, Place, RULES as CURVES, diverse, rated, tried};
+use crate::curves::{self, Context, Entry, Place, RULES as CURVES, briefly, diverse};
 use crate::parallel;
 use crate::terms::{Hypothesis, Term};
 use serde::Serialize;
 
-/// The curve in free form that explains the records best in place of an effect.
+/// The curve in free form that has the most evidence in place of an effect.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Curve {
     /// Where the curve acts.
@@ -34,10 +34,7 @@ impl Session<'_> {
         let curves = context.all(&Entry::ALL);
         let prior = (curves.len() as f64).ln();
         let curves = diverse(curves, CURVES.tried);
-        let mut curves = rated(
-            self.search,
-            parallel::some(curves, |curve| tried(self.search, without, curve)),
-        );
+        let mut curves = briefly(self.search, without, curves);
         curves.truncate(CURVES.finished);
         let evident = parallel::some(curves, |curve| {
             Some((self.evidence_of(&curve.brief.model)? - prior, curve))

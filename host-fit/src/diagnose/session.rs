@@ -305,7 +305,7 @@ impl Session<'_> {
         found: &Found,
     ) -> bool {
         let sets = self.sets(model, &way.order, way.proven, compared, &found.root);
-        let certificates = self.certificates(model, &sets, &compared.others, found, false);
+        let certificates = self.certificates(model, &sets, &compared.others, found, true);
         let first = way
             .order
             .first()

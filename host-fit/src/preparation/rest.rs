@@ -6,6 +6,7 @@ use super::reference::FirstOrder;
 use crate::baseline::{Baselines, SecondOrder};
 use crate::data::{Record, Use};
 use crate::model::CommandRange;
+use crate::order;
 use crate::picture::significant;
 use crate::residual::correlation;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
@@ -266,13 +267,11 @@ impl MovingZero {
         if is_chance || !rests.agree_with_responses() {
             return None;
         }
-        let named = |of: usize| (rests.rests[of].0.name.clone(), levels[of]);
+        let names = rests.rests.iter().map(|(record, _)| record.name.as_str());
         Some(Self {
-            lowest: named(lowest),
-            highest: named(highest),
-            zeros,
             slower,
             by_rests: true,
+            ..Self::by_levels(names, &levels, zeros)?
         })
     }
 }
@@ -311,9 +310,10 @@ impl MovingZero {
         let levels: Vec<f64> = own.iter().map(|own| own.level).collect();
         let samples: Vec<usize> = own.iter().map(|own| own.samples).collect();
         let (p, zeros) = between(&noise, &levels, &samples, 0.0)?;
-        let low = levels.iter().copied().fold(f64::INFINITY, f64::min);
-        let high = levels.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        if p >= RULES.moving_zero_p || high - low < RULES.moving_zero_noise * noise.within.sqrt() {
+        let names = records.iter().map(|record| record.name.as_str());
+        let moving = Self::by_levels(names, &levels, zeros)?;
+        let apart = moving.highest.1 - moving.lowest.1;
+        if p >= RULES.moving_zero_p || apart < RULES.moving_zero_noise * noise.within.sqrt() {
             return None;
         }
         let common = mean(&levels);
@@ -321,16 +321,25 @@ impl MovingZero {
         for (record, level) in tared.iter_mut().zip(&levels) {
             subtract(record, level - common);
         }
-        let by_level = |a: &usize, b: &usize| levels[*a].total_cmp(&levels[*b]);
-        let named = |of: usize| (records[of].name.clone(), levels[of]);
-        let moving = Self {
-            lowest: named((0..levels.len()).min_by(by_level)?),
-            highest: named((0..levels.len()).max_by(by_level)?),
+        Some((moving, tared))
+    }
+
+    /// An offset found from whole records, with the `levels` of the records of these names. `None` without records.
+    fn by_levels<'a>(
+        names: impl Iterator<Item = &'a str>,
+        levels: &[f64],
+        zeros: f64,
+    ) -> Option<Self> {
+        let mut named: Vec<(&str, f64)> = names.zip(levels.iter().copied()).collect();
+        order::ascending(&mut named, |(_, level)| *level);
+        let of = |(name, level): &(&str, f64)| ((*name).to_owned(), *level);
+        Some(Self {
+            lowest: of(named.first()?),
+            highest: of(named.last()?),
             zeros,
             slower: 0.0,
             by_rests: false,
-        };
-        Some((moving, tared))
+        })
     }
 
     /// As [`MovingZero::of`], but with levels from the second-order response through whole records; returns also
@@ -369,16 +378,9 @@ impl MovingZero {
         if p >= RULES.moving_zero_p {
             return None;
         }
-        let by_zero = |a: &usize, b: &usize| zeros[*a].total_cmp(&zeros[*b]);
-        let named = |of: usize| (records[of].name.clone(), second.level + zeros[of]);
-        let moving = Self {
-            lowest: named((0..zeros.len()).min_by(by_zero)?),
-            highest: named((0..zeros.len()).max_by(by_zero)?),
-            zeros: variance,
-            slower: 0.0,
-            by_rests: false,
-        };
-        Some((moving, tared))
+        let names = records.iter().map(|record| record.name.as_str());
+        let levels: Vec<f64> = zeros.iter().map(|zero| second.level + zero).collect();
+        Some((Self::by_levels(names, &levels, variance)?, tared))
     }
 }
 
@@ -658,16 +660,18 @@ mod tests {
         Record::new(name, Use::Identify, 0.001, u, y)
     }
 
+    fn three_switched_early(zeros: [f64; 3], bent: bool) -> Vec<Record> {
+        let holds = [160, 210, 130];
+        let each = zeros.into_iter().zip(holds).zip(["a", "b", "c"]);
+        each.map(|((zero, hold), name)| switched_early(name, zero, bent, hold))
+            .collect()
+    }
+
     /// The levels are further apart than y moves, as of a battery at different charges. A misfit of the response does not
     /// give such levels.
     #[test]
     fn levels_further_apart_than_y_moves_are_zeros() {
-        let records = |zeros: [f64; 3], bent| {
-            let holds = [160, 210, 130];
-            let each = zeros.into_iter().zip(holds).zip(["a", "b", "c"]);
-            each.map(|((zero, hold), name)| switched_early(name, zero, bent, hold))
-                .collect::<Vec<Record>>()
-        };
+        let records = three_switched_early;
         let (moving, tared) = MovingZero::by_own_levels(&records([0.0, 3.0, -2.0], true)).unwrap();
         assert_eq!((&*moving.lowest.0, &*moving.highest.0), ("c", "b"));
         let apart = moving.highest.1 - moving.lowest.1;
@@ -678,12 +682,7 @@ mod tests {
 
     #[test]
     fn zeros_of_records_with_short_rests_are_read_from_the_response() {
-        let records = |zeros: [f64; 3], bent| {
-            let holds = [160, 210, 130];
-            let each = zeros.into_iter().zip(holds).zip(["a", "b", "c"]);
-            each.map(|((zero, hold), name)| switched_early(name, zero, bent, hold))
-                .collect::<Vec<Record>>()
-        };
+        let records = three_switched_early;
         let (moving, tared) = MovingZero::by_response(&records([0.0, 0.05, 0.02], false)).unwrap();
         assert_eq!((&*moving.lowest.0, &*moving.highest.0), ("a", "b"));
         let apart = moving.highest.1 - moving.lowest.1;

@@ -5,7 +5,7 @@ use super::symptom::{effect_in_words, meant, shown};
 use super::{Answer, Tone};
 use crate::data::Plant;
 use crate::diagnose::{
-    Certificate, Diagnosis, FLOW_LAG, FLOW_MEMORY, HeldOutBy, Memory, RULES, Rung, Verdict,
+    Certificate, Curve, Diagnosis, FLOW_LAG, FLOW_MEMORY, HeldOutBy, Memory, RULES, Rung, Verdict,
 };
 use crate::discover::Glance;
 use crate::model::Model;
@@ -81,15 +81,19 @@ fn curves(answer: &mut Answer, diagnosis: &Diagnosis, plant: Plant) {
     for name in &diagnosis.stand_ins {
         let certificate = diagnosis.certificates.get(name);
         if let Some(curve) = certificate.and_then(Certificate::better_curve) {
-            answer.note(format!(
-                "{} is not named: a curve at the {} that depends on the {} explains the records as \
-                 well. `discover` fits such curves.",
-                effect_in_words(name, plant),
-                curve.place.word(),
-                on(&curve.coordinate)
-            ));
+            answer.note(replaced(&effect_in_words(name, plant), curve));
         }
     }
+}
+
+/// Why an effect is not named, if a curve explains the records as well.
+fn replaced(effect: &str, curve: &Curve) -> String {
+    format!(
+        "{effect} is not named: a curve at the {} that depends on the {} explains the records as well. `discover` fits \
+         such curves.",
+        curve.place.word(),
+        on(&curve.coordinate)
+    )
 }
 
 /// A coordinate as a noun.
@@ -225,19 +229,20 @@ fn finding(diagnosis: &Diagnosis, plant: Plant) -> Answer {
         }
         Verdict::PartlyExplained => {
             let own = |name| diagnosis.certificates.get(name);
-            let certificates = diagnosis.stand_ins.iter().filter_map(own);
+            let mut certificates = diagnosis.stand_ins.iter().filter_map(own);
             let unknown = |name: &String| !diagnosis.is_identified(name);
+            let curve_is_better = certificates.clone().any(|one| one.better_curve().is_some());
             // Where a curve of the channel is better, the channel acts at another place.
-            let channels = match certificates.clone().any(|one| one.better_curve().is_some()) {
+            let channels = match curve_is_better {
                 true => &[],
                 false => of_channels(diagnosis),
             };
             let why = if !channels.is_empty() {
                 "the model was identified without the measured channel, and the cause is decided after it is identified \
                  with the channel"
-            } else if certificates.clone().any(|one| one.evidence_nats < 0.0) {
+            } else if certificates.any(|one| one.evidence_nats < 0.0) {
                 "there is more evidence for a model without them"
-            } else if certificates.clone().any(|one| one.better_curve().is_some()) {
+            } else if curve_is_better {
                 "a curve explains the records as well"
             } else if diagnosis.stand_ins.iter().any(unknown) {
                 "the records do not determine their parameters"
@@ -552,6 +557,22 @@ mod tests {
             called(&model, &names),
             ["the measured input `Fan 2`", "scaled-by-fan-2", "valve-lag"]
         );
+    }
+
+    #[test]
+    fn the_curve_that_replaces_an_effect_is_described() {
+        let said = |place, coordinate: &str| {
+            let curve = Curve {
+                place,
+                coordinate: coordinate.to_owned(),
+                evidence_nats: -170.0,
+            };
+            replaced("starting-vortex", &curve)
+        };
+        let jet = said(crate::curves::Place::Jet, "since rising edge");
+        assert!(jet.contains("at the jet that depends on the time since rising edge"));
+        let flow = said(crate::curves::Place::Flow, "wind × y");
+        assert!(flow.contains("at the flow that depends on the wind × y"));
     }
 
     #[test]

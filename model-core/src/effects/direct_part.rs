@@ -30,7 +30,7 @@ impl<T: Real> Physics<T> for DirectPart<T> {
         equation: "y(t) = s(t) + g·j(t − h)",
         parameters: &[Parameter::new("gain", Unit::Y, [-2.0, 2.0], &[0.2, -0.2])],
         base: true,
-        source: "thrust of the jets on a force balance; resistance in series with a memory",
+        source: "direct feedthrough of a linear system: Ljung, System Identification (1999), ch. 4",
         ..Spec::PLAIN
     };
 

@@ -1,5 +1,6 @@
-//! A measured channel as a second input of the plant (a second heater, a fan, the ambient temperature), and as a
-//! factor of the reading (the dynamic pressure at a balance, the temperature at a hot film).
+//! A measured channel as a second input of the plant (a second heater, a fan, the ambient temperature), as a factor of
+//! the reading (the dynamic pressure at a balance, the temperature at a hot film) or of the jets (the supply's pressure
+//! or voltage), and as the speed that carries the response to the sensor (the free stream, a belt).
 
 use super::RULES;
 use crate::data::Record;
@@ -82,19 +83,33 @@ struct Channel<'a> {
     high: f64,
 }
 
-/// Two effects for each measured channel of `records`. One adds a response to the channel to the reading: a first-order
-/// lag with dead time of the channel's deviation from its first value, as a fraction of its range; at rest the channel
-/// has its first value and the response is 0. The other multiplies the reading by a linear function of the channel, if
-/// the channel does not change its sign. A channel must be in all records, vary, not be read by an effect of the
-/// catalogue, and not be a copy of y, the command or a clock.
+/// Up to four effects for each measured channel of `records`. One adds a response to the channel to the reading: a
+/// first-order lag with dead time of the channel's deviation from its first value, as a fraction of its range; at rest
+/// the channel has its first value and the response is 0. Two multiply the reading or the jets by a power of the channel,
+/// if the channel does not change its sign. In the fourth the channel, if positive, is the speed that carries the
+/// response to the sensor. A channel must be in all records, vary, and not be a copy of y, the command or a clock; for
+/// a channel that an effect of the catalogue reads there is only the fourth.
 #[must_use]
 pub(crate) fn measured_inputs(records: &[Record]) -> Vec<&'static Definition> {
     effects_of(channels_that_vary(records).iter())
 }
 
 fn effects_of<'a>(channels: impl Iterator<Item = &'a Channel<'a>>) -> Vec<&'static Definition> {
-    let both = |channel: &Channel<'_>| [measured_input(channel), scaled_by(channel)];
-    channels.flat_map(both).flatten().collect()
+    let read = |channel: &Channel<'_>| SPECS.iter().any(|spec| spec.channel == Some(channel.name));
+    let each = |channel: &Channel<'_>| {
+        let new = || {
+            [
+                measured_input(channel),
+                scaled_by(channel),
+                driven_by(channel),
+            ]
+        };
+        let new = (!read(channel)).then(new).into_iter().flatten();
+        new.chain([carried_by(channel)])
+            .flatten()
+            .collect::<Vec<_>>()
+    };
+    channels.flat_map(each).collect()
 }
 
 /// The channels that fulfil the conditions of [`measured_inputs`].
@@ -102,10 +117,8 @@ fn channels_that_vary(records: &[Record]) -> Vec<Channel<'_>> {
     let Some(first) = records.first() else {
         return Vec::new();
     };
-    let read = |name: &str| SPECS.iter().any(|spec| spec.channel == Some(name));
     let everywhere = |name: &str| records.iter().all(|r| r.channels.contains_key(name));
-    let names = first.channels.keys();
-    let names = names.filter(|name| !read(name) && everywhere(name));
+    let names = first.channels.keys().filter(|name| everywhere(name));
     let known = [
         joined(records, |r| r.y.clone()),
         joined(records, |r| r.u.clone()),
@@ -129,10 +142,10 @@ fn channels_that_vary(records: &[Record]) -> Vec<Channel<'_>> {
     varying.collect()
 }
 
-/// The tool's own effect `prefix-CHANNEL` on the reading; `what` precedes the channel in its summary, and `body` is the
+/// The tool's own effect `prefix-CHANNEL` at a place; `what` precedes the channel in its summary, and `body` is the
 /// expression with states and parameters. `None` if the name is too long for an effect.
 fn of_channel(
-    prefix: &str,
+    [prefix, place]: [&str; 2],
     channel: &Channel<'_>,
     [what, source]: [&str; 2],
     body: &str,
@@ -145,7 +158,7 @@ fn of_channel(
     let [quoted, summary] = [channel.name.to_owned(), summary].map(toml::Value::String);
     let text = format!(
         r#"name = "{prefix}-{name}"
-place = "sensor"
+place = "{place}"
 summary = {summary}
 source = "{source}"
 channel = {quoted}
@@ -155,33 +168,105 @@ scales = true
     Definition::from_toml(&text, channel.name).ok()
 }
 
-/// The reading as a multiple of a linear function of the channel, beginning at the reading that does not depend on it.
-fn scaled_by(channel: &Channel<'_>) -> Option<&'static Definition> {
-    if channel.low * channel.high <= 0.0 {
-        return None;
-    }
+/// The lines of an expression in which `x / below` is the relative change of (v/v_mean)^gain with the channel: its Padé
+/// approximant, which is exact for the powers −1, 0 and 1.
+fn power(channel: &Channel<'_>) -> String {
     let signal = channel_signal(channel.name);
-    let body = format!(
-        r#"expression = "reading + gain * ({signal} / reference - 1.0) * (reading - zero)"
-[[parameter]]
+    format!(
+        "let x = gain * ({signal} / reference - 1.0);
+let below = max(1.0 + 0.5 * (1.0 - gain) * ({signal} / reference - 1.0), 0.1);"
+    )
+}
+
+/// The range of that power.
+const POWERS: &str = r#"[[parameter]]
 name = "gain"
 unit = "-"
 low = -10.0
 high = 10.0
 starts = [1.0, -0.5]
-[[parameter]]
+"#;
+
+/// The reading, above the level that does not depend on the channel, times a power of the channel.
+fn scaled_by(channel: &Channel<'_>) -> Option<&'static Definition> {
+    if channel.low * channel.high <= 0.0 {
+        return None;
+    }
+    let body = format!(
+        r#"expression = """
+{}
+reading + x / below * (reading - zero)"""
+{POWERS}[[parameter]]
 name = "zero"
 unit = "reading"
 low = -100.0
 high = 100.0
 starts = [0.0, -2.0]
-"#
+"#,
+        power(channel)
     );
     let texts = [
         "the reading scales with",
-        "calibration: to first order the sensitivity is a linear function of the channel",
+        "calibration: the sensitivity is a power of the channel",
     ];
-    of_channel("scaled-by", channel, texts, &body)
+    of_channel(["scaled-by", "sensor"], channel, texts, &body)
+}
+
+/// The jets times a power of the channel.
+fn driven_by(channel: &Channel<'_>) -> Option<&'static Definition> {
+    if channel.low * channel.high <= 0.0 {
+        return None;
+    }
+    let body = format!(
+        r#"expression = """
+{}
+jet + x / below * jet"""
+{POWERS}"#,
+        power(channel)
+    );
+    let texts = [
+        "the response to the command scales with",
+        "the supply of the jets: their strength is a power of its pressure or voltage",
+    ];
+    of_channel(["driven-by", "jet"], channel, texts, &body)
+}
+
+/// The slowest speed counts as the fastest divided by this, because the delay must be bounded.
+const MOST_SLOWER: f64 = 5.0;
+
+/// The response travels with the channel's speed: its delay is inversely proportional to the speed of the last transit,
+/// a mean with the age of that transit.
+fn carried_by(channel: &Channel<'_>) -> Option<&'static Definition> {
+    let Channel { low, high, .. } = *channel;
+    if low <= 0.0 {
+        return None;
+    }
+    let signal = channel_signal(channel.name);
+    let slowest = low.max(high / MOST_SLOWER);
+    let longest = high / slowest;
+    let body = format!(
+        r#"dead_time = "transit"
+expression = "delayed(jet, transit * reference / max(speed, {slowest:?}), transit * {longest:?})"
+[[state]]
+name = "speed"
+update = """
+if begun > 0.5 {{ speed + (1.0 - exp(-2.0 * period * speed / (transit * reference))) * ({signal} - speed) }} else {{ {signal} }}"""
+[[state]]
+name = "begun"
+update = "1.0"
+[[parameter]]
+name = "transit"
+unit = "s"
+low = 0.001
+high = 0.5
+starts = [0.01, 0.03, 0.06, 0.1]
+"#
+    );
+    let texts = [
+        "the dead time is inversely proportional to",
+        "convection: a distance divided by the speed",
+    ];
+    of_channel(["carried-by", "jet"], channel, texts, &body)
 }
 
 /// The response to the channel.
@@ -224,7 +309,7 @@ starts = [0.0, 0.02, 0.08, 0.25]
         "a response of y to",
         "superposition: a measured disturbance behind a first-order lag with dead time",
     ];
-    of_channel("input", channel, texts, &body)
+    of_channel(["input", "sensor"], channel, texts, &body)
 }
 
 #[cfg(test)]
@@ -232,6 +317,12 @@ mod tests {
     use super::*;
     use crate::data::Use;
     use model_core::effects::ZERO_OFFSET;
+
+    const SPEED: Channel<'_> = Channel {
+        name: "q",
+        low: 2.0,
+        high: 5.0,
+    };
 
     fn record(names: &[&str]) -> Record {
         let u = vec![0.0; 900];
@@ -253,7 +344,15 @@ mod tests {
             .insert("still".to_owned(), vec![1.0; 900]);
         let inputs = measured_inputs(&records);
         let names: Vec<&str> = inputs.iter().map(|input| input.spec().name).collect();
-        assert_eq!(names, ["input-heater-2", "scaled-by-heater-2"]);
+        let of_heater = [
+            "input-heater-2",
+            "scaled-by-heater-2",
+            "driven-by-heater-2",
+            "carried-by-heater-2",
+        ];
+        // The catalogue has an effect of the free stream on the strength of the jets.
+        assert_eq!(names[..4], of_heater);
+        assert_eq!(names[4..], ["carried-by-u-inf"]);
         // The channels are the reading in another unit, a copy of the command, and a clock.
         for record in &mut records {
             record.u = (0..900)
@@ -271,7 +370,8 @@ mod tests {
             .iter()
             .map(|i| i.spec().name)
             .collect();
-        assert_eq!(names, ["input-heater-2", "scaled-by-heater-2"]);
+        assert_eq!(names[..4], of_heater);
+        assert_eq!(names.len(), 5);
         // One record lacks the channel.
         assert!(measured_inputs(&[records[0].clone(), record(&[])]).is_empty());
     }
@@ -300,25 +400,23 @@ mod tests {
         assert_eq!((names.len(), names[0]), (RULES.inputs, "input-c7"));
     }
 
-    /// Twice the channel's relative change, of all that is above 1; the offset of 3 is part of the reading.
+    /// The square of the channel, of all that is above 1; the offset of 3 is part of the reading.
     #[test]
-    fn the_reading_is_a_multiple_of_a_linear_function_of_the_channel() {
-        let records = [record(&["q"])];
-        let scaled = scaled_by(&Channel {
-            name: "q",
-            low: 2.0,
-            high: 5.0,
-        })
-        .expect("of one sign");
+    fn the_reading_is_a_power_of_the_channel() {
+        let mut records = [record(&["q"])];
+        let near = |k: usize| if k < 300 { 3.2 } else { 4.8 };
+        let q = (0..900).map(near).collect();
+        records[0].channels.insert("q".to_owned(), q);
+        let scaled = scaled_by(&SPEED).expect("of one sign");
         let mut model = Model::default();
         model.define(scaled).expect("a new name");
         model.add(scaled.spec(), &[2.0, 1.0], Some(4.0));
         model.add(ZERO_OFFSET, &[3.0], None);
         let y = model.free_run(&records[0]).expect("it does not diverge");
         for (k, y) in y.iter().enumerate() {
-            let q = if k < 300 { 2.0 } else { 5.0 };
-            let expected = 3.0 + 2.0 * (q / 4.0 - 1.0) * (3.0 - 1.0);
-            assert!((y - expected).abs() < 1e-9, "{k}: {y}");
+            let power = (near(k) / 4.0_f64).powi(2);
+            let expected = 3.0 + (power - 1.0) * (3.0 - 1.0);
+            assert!((y - expected).abs() < 0.02, "{k}: {y}");
         }
         assert!(
             scaled_by(&Channel {
@@ -328,6 +426,50 @@ mod tests {
             })
             .is_none()
         );
+    }
+
+    /// A model whose y is the jet strength of the sample before.
+    fn jets(own: &'static Definition, parameters: &[f64], reference: f64) -> Model {
+        let mut model = Model {
+            b: vec![1.0],
+            ..Model::default()
+        };
+        model.define(own).expect("a new name");
+        model.add(own.spec(), parameters, Some(reference));
+        model
+    }
+
+    #[test]
+    fn the_jets_arrive_after_a_distance() {
+        let mut record = record(&["q"]);
+        let command = |k: usize| f64::from(u8::from(k / 100 % 2 == 1));
+        record.u = (0..900).map(command).collect();
+        let carried = carried_by(&SPEED).expect("positive");
+        let y = jets(carried, &[0.040], 4.0)
+            .free_run(&record)
+            .expect("it does not diverge");
+        // A distance of 4 · 0.040: 80 samples at the speed 2, 32 at 5, some time after the change.
+        for (range, delay) in [(90..295, 80), (400..890, 32)] {
+            for k in range {
+                let expected = command(k - 1 - delay);
+                assert!((y[k] - expected).abs() < 0.05, "{k}: {}", y[k]);
+            }
+        }
+    }
+
+    /// The power of a heater at another voltage.
+    #[test]
+    fn the_jets_are_a_power_of_the_channel() {
+        let mut record = record(&["q"]);
+        record.u = vec![1.0; 900];
+        let driven = driven_by(&SPEED).expect("of one sign");
+        for gain in [-1.0, 1.0, 2.0] {
+            let y = jets(driven, &[gain], 4.5)
+                .free_run(&record)
+                .expect("it does not diverge");
+            let expected = (5.0_f64 / 4.5).powf(gain);
+            assert!((y[800] - expected).abs() < 0.001, "{gain}: {}", y[800]);
+        }
     }
 
     #[test]

@@ -286,6 +286,7 @@ impl Term {
             } => {
                 model.add(spec, parameters, *reference);
                 model.grading = *grading;
+                model.delay_later(-dead_time(spec, parameters, model.sample_period_s));
             }
             Self::Offset => {
                 let level = coefficients.first().copied().unwrap_or(0.0);
@@ -343,7 +344,13 @@ impl Term {
             Self::Effect { spec, .. } if spec.place == Place::Delay => {
                 take_delay_law(&mut model, &base.delay);
             }
-            Self::Effect { spec, .. } => model.effects.retain(|e| e.name != spec.name),
+            Self::Effect { spec, .. } => {
+                if let Some(at) = model.effects.iter().position(|e| e.name == spec.name) {
+                    let added = model.effects.remove(at);
+                    let own = dead_time(spec, &added.parameters, model.sample_period_s);
+                    model.delay_later(own);
+                }
+            }
             Self::Offset => model.effects.retain(|e| e.name != ZERO_OFFSET.name),
             Self::LevelRate => model.effects.retain(|e| e.name != LEVEL_RATE.name),
             Self::Wake(_) => model.effects.retain(|e| e.name != SLOW_WAKE.name),
@@ -482,6 +489,16 @@ fn mean_delay(spec: &Spec, parameters: &[f64], period: f64) -> f64 {
     let mut state = effect.start();
     let missing = (0..PATH_SETTLED).map(|_| 1.0 - effect.jet(&mut state, 1.0, &step));
     missing.sum()
+}
+
+/// The effect's own dead time, samples.
+fn dead_time(spec: &Spec, parameters: &[f64], period: f64) -> f64 {
+    let mut cards = spec.parameters.iter();
+    let at = spec
+        .dead_time
+        .and_then(|name| cards.position(|card| card.name == name));
+    let seconds = at.and_then(|at| parameters.get(at)).copied().unwrap_or(0.0);
+    seconds / period
 }
 
 /// Samples after which a step response has settled.

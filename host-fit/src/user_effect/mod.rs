@@ -18,7 +18,7 @@ pub use interpreter::{UserEffect, UserState};
 pub(crate) use rust::{line_lengths, number, rust_module};
 pub use rust::{module_name, type_name};
 
-use model_core::effect::Spec;
+use model_core::effect::{Place, Spec};
 use program::Program;
 use source::Refusal;
 pub(crate) use source::{Source, channel_signal};
@@ -181,7 +181,7 @@ impl Definition {
 
     /// Whether the effect is a measured input: a channel with a response of its own.
     pub(crate) fn is_measured_input(&self) -> bool {
-        self.is_of_a_channel() && self.source.has_states()
+        self.is_of_a_channel() && self.spec.place == Place::Sensor && self.source.has_states()
     }
 
     /// Operations of the effect at a sample.

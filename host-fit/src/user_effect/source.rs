@@ -20,6 +20,9 @@ pub(crate) struct Source {
     /// Whether no number in the expressions has a unit of y or time, so that it is also valid in other units.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub(super) scales: bool,
+    /// The parameter that is a dead time of the jets, s.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    dead_time: Option<String>,
     expression: String,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     state: Vec<SourceState>,
@@ -183,6 +186,17 @@ impl Source {
                 return key(&label, "`start` is not a finite number".to_owned());
             }
         }
+        if let Some(name) = &self.dead_time {
+            let own = self
+                .parameter
+                .iter()
+                .find(|parameter| parameter.name == *name);
+            if self.place != SourcePlace::Jet || own.is_none_or(|own| own.unit() != Unit::Second) {
+                let problem =
+                    "`dead_time` must be the name of a parameter in s, of an effect at the jet";
+                return key("dead_time", problem.to_owned());
+            }
+        }
         let mut states = Vec::with_capacity(self.state.len());
         for state in &self.state {
             let update = compiler.number(&state.update).map_err(|fault| {
@@ -252,6 +266,7 @@ impl Source {
             equation: keep(&self.equation()),
             parameters: Vec::leak(parameters),
             channel: self.channel.as_deref().map(keep),
+            dead_time: self.dead_time.as_deref().map(keep),
             turn: match reads_offset {
                 true => Turn::Last,
                 false => Turn::InOrder,

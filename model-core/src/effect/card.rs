@@ -390,6 +390,9 @@ pub struct Spec {
     /// Whether the effect and a second lag of the flow give the same output for every command. Reports then
     /// always state both.
     pub lag_in_series: bool,
+    /// The parameter that is a dead time of the jets, s, in series with the model's own delay. A search shortens the
+    /// model's delay by it when it adds the effect.
+    pub dead_time: Option<&'static str>,
     /// Whether the effect opposes or scales a motion; it is then applied after all driving effects.
     pub resists: bool,
     /// When the effect acts among those of its place.
@@ -418,6 +421,7 @@ impl Spec {
         needs: Needs::Nothing,
         base: false,
         lag_in_series: false,
+        dead_time: None,
         resists: false,
         turn: Turn::InOrder,
         law: None,

@@ -5,6 +5,7 @@ mod coordinate;
 mod correlation;
 mod explained;
 mod noise;
+mod oscillation;
 #[cfg(test)]
 pub(crate) mod plants;
 mod rules;
@@ -17,6 +18,7 @@ pub use coordinate::FailureCoordinate;
 pub(crate) use correlation::{correlation_length, independent_block, p_above, student};
 pub use explained::Dependence;
 pub use noise::NoiseSource;
+pub use oscillation::Oscillation;
 pub use rules::{RULES, Rules};
 pub use trend::Trend;
 pub(crate) use trend::correlation;
@@ -85,6 +87,8 @@ pub struct Failures {
     pub noise_rmse: f64,
     /// Where the noise level comes from.
     pub noise_source: NoiseSource,
+    /// A steady oscillation of the residual that does not follow the command. It is part of the noise level.
+    pub oscillation: Option<Oscillation>,
     /// The records of the error.
     pub kind: ErrorKind,
     /// Mean error y − y_sim, in y.
@@ -148,6 +152,7 @@ pub fn examine(records: &[&Record], simulated: Vec<Vec<f64>>, delay: usize) -> F
         .map(|(record, run)| record.y.iter().zip(run).map(|(y, sim)| y - sim).collect())
         .collect();
     let (noise, noise_source) = noise::floor(records, &residual);
+    let oscillation = oscillation::steady(records, &residual);
     let lead: Vec<usize> = records.iter().map(|record| record.lead).collect();
     let scored: Vec<&[f64]> = residual
         .iter()
@@ -211,6 +216,7 @@ pub fn examine(records: &[&Record], simulated: Vec<Vec<f64>>, delay: usize) -> F
         rmse: f64::sqrt(squares / n),
         noise_rmse: errors.noise_rmse(),
         noise_source,
+        oscillation,
         kind: ErrorKind::of(records.first().map_or(Use::Identify, |record| record.role)),
         bias: sum / n,
         above_noise,

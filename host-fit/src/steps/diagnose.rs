@@ -209,6 +209,9 @@ pub fn diagnose(
     if let Some(beyond) = &beyond {
         answer.note(verdict::beyond(beyond));
     }
+    if let Some(steady) = failures.as_ref().and_then(|failures| failures.oscillation) {
+        answer.note(steady.to_string());
+    }
     if let Some(moving) = &prepared.moving_zero {
         answer.note(moving.to_string());
     }

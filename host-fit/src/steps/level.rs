@@ -64,7 +64,7 @@ pub(super) fn compared(
     } else {
         Answer::new(Tone::Good, format!("the {error} is at the noise level")).next(finished())
     };
-    answer
+    let mut answer = answer
         .evidence(format!(
             "The {error} of the free run is {}.",
             beside_noise(all)
@@ -72,7 +72,11 @@ pub(super) fn compared(
         .confidence(residual_test(
             &correlations(&Residuals::of(records, runs)),
             failures.above_noise,
-        ))
+        ));
+    if let Some(steady) = failures.oscillation {
+        answer.note(steady.to_string());
+    }
+    answer
 }
 
 /// The answer of an identification; `parameters` are those of the model.

@@ -190,7 +190,7 @@ mod tests {
     #[test]
     fn hum_is_found_with_its_frequency_and_amplitude() {
         let mut rng = ChaCha8Rng::seed_from_u64(1);
-        let record = record(|k| f64::from(u8::from(k / 137 % 2 == 0)));
+        let record = record(|k| f64::from(u8::from(k % 274 < 137)));
         let hum = |k: usize| 0.07 * (TAU * 50.02 * PERIOD_S * k as f64 + 1.0).sin();
         let series = [noise(&mut rng, hum), noise(&mut rng, hum)];
         let found = steady(&[&record, &record], &series).expect("hum");
@@ -204,12 +204,12 @@ mod tests {
     #[test]
     fn what_is_no_steady_oscillation_is_none() {
         let mut rng = ChaCha8Rng::seed_from_u64(2);
-        let u = |k: usize| f64::from(u8::from(k / 25 % 2 == 0));
+        let u = |k: usize| f64::from(u8::from(k % 50 < 25));
         let periodic = record(u);
         assert_eq!(steady(&[&periodic], &[noise(&mut rng, |_| 0.0)]), None);
         let misfit = noise(&mut rng, |k| 0.5 * u(k));
         assert_eq!(steady(&[&periodic], &[misfit]), None);
-        let edges = record(|k| f64::from(u8::from((k * k / 90_000) % 2 == 0)));
+        let edges = record(|k| f64::from(u8::from((k * k / 90_000).is_multiple_of(2))));
         let mut since = 0;
         let rings: Vec<f64> = (0..6000)
             .map(|k| {

@@ -4,6 +4,7 @@
 //! searched again with the effects, from the lowest order and from the given structure.
 
 use std::collections::BTreeMap;
+use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::data::Record;
@@ -67,7 +68,14 @@ pub fn nearest_name(name: &str, known: &[&str]) -> String {
         .iter()
         .map(|known| (levenshtein(name, known), *known))
         .min();
+    let is_file = Path::new(name)
+        .extension()
+        .is_some_and(|kind| kind == "toml");
     let hint = match nearest {
+        _ if is_file => format!(
+            " An effect file is given with `--effect-file {}`; `--effect` is the name in it.",
+            name.escape_debug()
+        ),
         Some((edits, nearest)) if edits <= 1 + nearest.len() / 3 => {
             format!(" Did you mean `{nearest}`?")
         }
@@ -224,6 +232,8 @@ mod tests {
         let known = ["valve-lag", "plenum-droop"];
         let text = nearest_name("plenum-drop", &known);
         assert!(text.contains("Did you mean `plenum-droop`?"), "{text}");
+        let text = nearest_name("my.toml", &known);
+        assert!(text.contains("`--effect-file my.toml`"), "{text}");
         let text = nearest_name("x\n", &known);
         assert!(
             !text.contains("Did you mean") && !text.contains('\n'),

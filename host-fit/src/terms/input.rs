@@ -168,13 +168,13 @@ scales = true
     Definition::from_toml(&text, channel.name).ok()
 }
 
-/// The lines of an expression in which `x / below` is the relative change of (v/v_mean)^gain with the channel: its Padé
+/// The lines of an expression in which `numerator / denominator` is the relative change of (v/v_mean)^gain with the channel: its Padé
 /// approximant, which is exact for the powers −1, 0 and 1.
 fn power(channel: &Channel<'_>) -> String {
     let signal = channel_signal(channel.name);
     format!(
-        "let x = gain * ({signal} / reference - 1.0);
-let below = max(1.0 + 0.5 * (1.0 - gain) * ({signal} / reference - 1.0), 0.1);"
+        "let numerator = gain * ({signal} / reference - 1.0);
+let denominator = max(1.0 + 0.5 * (1.0 - gain) * ({signal} / reference - 1.0), 0.1);"
     )
 }
 
@@ -195,7 +195,7 @@ fn scaled_by(channel: &Channel<'_>) -> Option<&'static Definition> {
     let body = format!(
         r#"expression = """
 {}
-reading + x / below * (reading - zero)"""
+reading + numerator / denominator * (reading - zero)"""
 {POWERS}[[parameter]]
 name = "zero"
 unit = "reading"
@@ -220,7 +220,7 @@ fn driven_by(channel: &Channel<'_>) -> Option<&'static Definition> {
     let body = format!(
         r#"expression = """
 {}
-jet + x / below * jet"""
+jet + numerator / denominator * jet"""
 {POWERS}"#,
         power(channel)
     );
@@ -246,13 +246,15 @@ fn carried_by(channel: &Channel<'_>) -> Option<&'static Definition> {
     let longest = high / slowest;
     let body = format!(
         r#"dead_time = "transit"
-expression = "delayed(jet, transit * reference / max(speed, {slowest:?}), transit * {longest:?})"
+expression = "delayed(jet, transit * reference / max(mean_speed, {slowest:?}), transit * {longest:?})"
 [[state]]
-name = "speed"
+name = "mean_speed"
 update = """
-if begun > 0.5 {{ speed + (1.0 - exp(-2.0 * period * speed / (transit * reference))) * ({signal} - speed) }} else {{ {signal} }}"""
+if has_begun > 0.5 {{
+    mean_speed + (1.0 - exp(-2.0 * period * mean_speed / (transit * reference))) * ({signal} - mean_speed)
+}} else {{ {signal} }}"""
 [[state]]
-name = "begun"
+name = "has_begun"
 update = "1.0"
 [[parameter]]
 name = "transit"
@@ -274,16 +276,16 @@ fn measured_input(channel: &Channel<'_>) -> Option<&'static Definition> {
     let signal = channel_signal(channel.name);
     let range = channel.high - channel.low;
     let body = format!(
-        r#"expression = "reading + gain * level"
+        r#"expression = "reading + gain * lagged"
 [[state]]
-name = "first"
-update = "if begun > 0.5 {{ first }} else {{ {signal} }}"
+name = "first_value"
+update = "if has_begun > 0.5 {{ first_value }} else {{ {signal} }}"
 [[state]]
-name = "level"
+name = "lagged"
 update = """
-level + (1.0 - exp(-period / lag)) * (delayed(({signal} - first) / {range:?}, dead_time) - level)"""
+lagged + (1.0 - exp(-period / lag)) * (delayed(({signal} - first_value) / {range:?}, dead_time) - lagged)"""
 [[state]]
-name = "begun"
+name = "has_begun"
 update = "1.0"
 [[parameter]]
 name = "gain"
@@ -374,6 +376,24 @@ mod tests {
         assert_eq!(names.len(), 5);
         // One record lacks the channel.
         assert!(measured_inputs(&[records[0].clone(), record(&[])]).is_empty());
+    }
+
+    /// The names in the expressions of an effect may not hide its channel.
+    #[test]
+    fn channels_may_be_called_as_they_like() {
+        for name in [
+            "speed",
+            "level",
+            "x",
+            "first",
+            "period",
+            "t",
+            "reference",
+            "U inf",
+        ] {
+            let names = measured_inputs(&[record(&[name])]).len();
+            assert_eq!(names, 4, "{name}");
+        }
     }
 
     #[test]

@@ -76,9 +76,23 @@ fn is_identifier(name: &str) -> bool {
         && syn::parse_str::<syn::Ident>(name).is_ok()
 }
 
-/// The name of a channel in expressions: its own, or `channel` if that is not a name of the language.
+/// Signals of the language.
+const SIGNALS: [&str; 10] = [
+    "u",
+    "y",
+    "t",
+    "since_edge",
+    "period",
+    "jet",
+    "reading",
+    "arrived",
+    "relaxation",
+    "reference",
+];
+
+/// The name of a channel in expressions: its own, or `channel` if that is no free name of the language.
 pub(crate) fn channel_signal(channel: &str) -> &str {
-    if is_identifier(channel) {
+    if is_identifier(channel) && !SIGNALS.contains(&channel) {
         channel
     } else {
         "channel"

@@ -151,8 +151,11 @@ pub fn examine(records: &[&Record], simulated: Vec<Vec<f64>>, delay: usize) -> F
         .zip(&simulated)
         .map(|(record, run)| record.y.iter().zip(run).map(|(y, sim)| y - sim).collect())
         .collect();
-    let (noise, noise_source) = noise::floor(records, &residual);
+    let (mut noise, noise_source) = noise::floor(records, &residual);
     let oscillation = oscillation::steady(records, &residual);
+    if let (Some(oscillation), NoiseSource::Scatter) = (&oscillation, noise_source) {
+        oscillation.join(&mut noise);
+    }
     let lead: Vec<usize> = records.iter().map(|record| record.lead).collect();
     let scored: Vec<&[f64]> = residual
         .iter()

@@ -1,7 +1,6 @@
 //! The noise level with which a residual is compared.
 
 use super::explained::Errors;
-use super::oscillation::steady;
 use super::rules::RULES;
 use crate::data::{Record, rounding_variance};
 
@@ -35,13 +34,10 @@ pub(super) fn floor(records: &[&Record], residual: &[Vec<f64>]) -> (Vec<Vec<f64>
             .iter()
             .zip(records)
             .map(|(e, record)| by_scatter(e.get(record.lead..).unwrap_or(&[])));
-        let white = each.sum::<f64>() / residual.len().max(1) as f64;
-        // An oscillation is smooth from sample to sample.
-        let oscillation = steady(records, residual).map_or(0.0, |found| {
-            let period_s = records.first().map_or(1.0, |record| record.sample_period_s);
-            found.mean_square - found.seen_as_white(period_s).min(white)
-        });
-        (white + oscillation, NoiseSource::Scatter)
+        (
+            each.sum::<f64>() / residual.len().max(1) as f64,
+            NoiseSource::Scatter,
+        )
     } else {
         let mean = repeats.iter().sum::<f64>() / repeats.len() as f64;
         (mean, NoiseSource::Repeats)

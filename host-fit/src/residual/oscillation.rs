@@ -21,6 +21,8 @@ const LONGEST: usize = 1 << 16;
 pub struct Oscillation {
     /// Frequency, Hz.
     pub frequency_hz: f64,
+    /// Cycles per sample.
+    cycles_per_sample: f64,
     /// Mean square, y².
     pub mean_square: f64,
     /// Share of the mean square of the series, 0–1.
@@ -45,10 +47,13 @@ impl Oscillation {
         [50.0, 60.0].into_iter().find(|mains| is_of(*mains))
     }
 
-    /// The part of it that third differences take for white noise, y².
-    pub(super) fn seen_as_white(&self, period_s: f64) -> f64 {
-        let gain = (2.0 * (std::f64::consts::PI * self.frequency_hz * period_s).sin()).powi(6);
-        self.mean_square * gain / 20.0
+    /// Adds it to noise variances that were estimated from third differences, which contain little of it.
+    pub(super) fn join(&self, noise: &mut [Vec<f64>]) {
+        let gain = (2.0 * (std::f64::consts::PI * self.cycles_per_sample).sin()).powi(6);
+        let seen = self.mean_square * gain / 20.0;
+        for variance in noise.iter_mut().flatten() {
+            *variance += self.mean_square - seen.min(*variance);
+        }
     }
 }
 
@@ -98,6 +103,7 @@ pub(super) fn steady(records: &[&Record], series: &[Vec<f64>]) -> Option<Oscilla
     let mean = |of: fn(&Line) -> f64| alike.iter().map(|line| of(line)).sum::<f64>() / n;
     let found = Oscillation {
         frequency_hz: mean(|line| line.hz),
+        cycles_per_sample: mean(|line| line.hz) * records.first()?.sample_period_s,
         mean_square: mean(|line| line.mean_square),
         share: mean(|line| line.mean_square / line.all),
     };

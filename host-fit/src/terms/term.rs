@@ -611,6 +611,7 @@ fn out_of_series(model: &mut Model) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::user_effect::Definition;
 
     fn base() -> Model {
         Model {
@@ -683,6 +684,45 @@ mod tests {
             let without = term.taken_from(&with, &model);
             assert_eq!(without, model);
         }
+    }
+
+    /// An effect with a dead time takes it from the model's own.
+    #[test]
+    fn the_dead_time_of_an_effect_is_part_of_the_delay() {
+        let own = Definition::from_toml(
+            r#"name = "carried"
+place = "jet"
+summary = "a part of the dead time"
+dead_time = "transit"
+expression = "delayed(jet, transit)"
+[[parameter]]
+name = "transit"
+unit = "s"
+low = 0.001
+high = 0.5
+starts = [0.05]
+"#,
+            "carried",
+        )
+        .unwrap();
+        let mut model = base();
+        model.delay = Delay::Fixed {
+            delays: vec![80, 80],
+        };
+        model.define(own).unwrap();
+        let term = Term::Effect {
+            spec: own.spec(),
+            parameters: vec![0.030],
+            grading: model.grading,
+            reference: None,
+        };
+        let with = term.added_to(&model, &[]);
+        let samples = (0.030 / model.sample_period_s).round() as u16;
+        let shorter = Delay::Fixed {
+            delays: vec![80 - samples; 2],
+        };
+        assert_eq!(with.delay, shorter);
+        assert_eq!(term.taken_from(&with, &model).delay, model.delay);
     }
 
     /// Adding a lag to a first-order flow and removing it again restores the model.

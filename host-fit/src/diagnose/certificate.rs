@@ -215,8 +215,7 @@ impl Session<'_> {
     /// largest evidence of the models that contain neither the effect, nor another member of its equivalence set, nor an
     /// effect that reads the same channel. A model without the effect may have more evidence than `subject` because of
     /// its other terms; the effect is therefore also added to such models. `against_curves`: whether effects are also
-    /// compared with curves
-    /// (if `subject` is above the noise level, or that level is unknown).
+    /// compared with curves (if `subject` is above the noise level, or that level is unknown).
     pub(super) fn certificates(
         &self,
         subject: &Hypothesis,

@@ -151,10 +151,11 @@ pub fn examine(records: &[&Record], simulated: Vec<Vec<f64>>, delay: usize) -> F
         .zip(&simulated)
         .map(|(record, run)| record.y.iter().zip(run).map(|(y, sim)| y - sim).collect())
         .collect();
+    let period_s = records.first().map_or(1.0, |r| r.sample_period_s);
     let (mut noise, noise_source) = noise::floor(records, &residual);
     let oscillation = oscillation::steady(records, &residual);
     if let (Some(oscillation), NoiseSource::Scatter) = (&oscillation, noise_source) {
-        oscillation.join(&mut noise);
+        oscillation.join(&mut noise, period_s);
     }
     let lead: Vec<usize> = records.iter().map(|record| record.lead).collect();
     let scored: Vec<&[f64]> = residual
@@ -168,7 +169,7 @@ pub fn examine(records: &[&Record], simulated: Vec<Vec<f64>>, delay: usize) -> F
         simulated,
         noise,
         lead,
-        period_s: records.first().map_or(1.0, |r| r.sample_period_s),
+        period_s,
     };
     let source = Source {
         records,

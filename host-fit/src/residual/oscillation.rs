@@ -7,10 +7,6 @@ use crate::picture::significant;
 use numerics::fourier::Fourier;
 use std::fmt;
 
-/// Spectral lines on either side of a peak that belong to it: an oscillation between two lines is in both.
-const WIDTH: usize = 2;
-/// Spectral lines on either side with which a peak is compared.
-const AROUND: usize = 24;
 /// Halvings of the distance of spectral lines when the frequency is refined.
 const REFINEMENTS: usize = 7;
 /// The longest transform.
@@ -21,11 +17,9 @@ const LONGEST: usize = 1 << 16;
 pub struct Oscillation {
     /// Frequency, Hz.
     pub frequency_hz: f64,
-    /// Cycles per sample.
-    cycles_per_sample: f64,
     /// Mean square, y².
     pub mean_square: f64,
-    /// Share of the mean square of the series, 0–1.
+    /// Share of the variance of the residual, 0–1.
     pub share: f64,
 }
 
@@ -48,8 +42,8 @@ impl Oscillation {
     }
 
     /// Adds it to noise variances that were estimated from third differences, which contain little of it.
-    pub(super) fn join(&self, noise: &mut [Vec<f64>]) {
-        let gain = (2.0 * (std::f64::consts::PI * self.cycles_per_sample).sin()).powi(6);
+    pub(super) fn join(&self, noise: &mut [Vec<f64>], period_s: f64) {
+        let gain = (2.0 * (std::f64::consts::PI * self.frequency_hz * period_s).sin()).powi(6);
         let seen = self.mean_square * gain / 20.0;
         for variance in noise.iter_mut().flatten() {
             *variance += self.mean_square - seen.min(*variance);
@@ -81,29 +75,29 @@ impl fmt::Display for Oscillation {
 struct Line {
     hz: f64,
     mean_square: f64,
-    /// Mean square of the series, y².
+    /// Variance of the series, y².
     all: f64,
     /// Distance of the spectral lines, Hz.
     apart: f64,
 }
 
-/// The steady oscillation that at least half of the series, one per record, have in common.
+/// The steady oscillation that most of the series, one per record, have in common.
 pub(super) fn steady(records: &[&Record], series: &[Vec<f64>]) -> Option<Oscillation> {
     let each = records.iter().zip(series);
     let lines: Vec<Line> = each.filter_map(|(record, e)| line(record, e)).collect();
     let mut by_frequency: Vec<&Line> = lines.iter().collect();
     by_frequency.sort_by(|a, b| a.hz.total_cmp(&b.hz));
     let middle = by_frequency.get(by_frequency.len() / 2)?.hz;
-    let alike = |line: &&Line| (line.hz - middle).abs() <= WIDTH as f64 * line.apart;
+    let width = RULES.oscillation[0] as f64;
+    let alike = |line: &&Line| (line.hz - middle).abs() <= width * line.apart;
     let alike: Vec<&Line> = lines.iter().filter(alike).collect();
     let n = alike.len() as f64;
-    if 2.0 * n < records.len() as f64 {
+    if n < RULES.agreeing_records * records.len() as f64 {
         return None;
     }
     let mean = |of: fn(&Line) -> f64| alike.iter().map(|line| of(line)).sum::<f64>() / n;
     let found = Oscillation {
         frequency_hz: mean(|line| line.hz),
-        cycles_per_sample: mean(|line| line.hz) * records.first()?.sample_period_s,
         mean_square: mean(|line| line.mean_square),
         share: mean(|line| line.mean_square / line.all),
     };
@@ -113,13 +107,11 @@ pub(super) fn steady(records: &[&Record], series: &[Vec<f64>]) -> Option<Oscilla
 /// The highest line in the spectrum of `e`, if it is a line and the command has none there.
 fn line(record: &Record, e: &[f64]) -> Option<Line> {
     let (e, u) = (e.get(record.lead..)?, record.u.get(record.lead..)?);
-    if e.len() < 8 * AROUND {
-        return None;
-    }
-    let length = 1 << e.len().min(LONGEST).ilog2();
+    let [width, around] = RULES.oscillation;
+    let length = e.len().min(LONGEST);
+    let (e, u) = (&e[..length], u.get(..length)?);
     let transform = Fourier::new(length);
     let power = |x: &[f64]| -> Vec<f64> {
-        let x = &x[..length];
         let mean = x.iter().sum::<f64>() / length as f64;
         let lines = transform.lines(x.iter().map(|x| x - mean).collect());
         let half = lines.iter().take(length / 2);
@@ -127,23 +119,20 @@ fn line(record: &Record, e: &[f64]) -> Option<Line> {
             .collect()
     };
     let (own, command) = (power(e), power(u));
-    let inner = AROUND..own.len().checked_sub(AROUND)?;
+    let inner = around..own.len().checked_sub(around)?;
     let peak = inner.max_by(|a, b| own[*a].total_cmp(&own[*b]))?;
     let sum = |of: &[f64], within: usize| of[peak - within..=peak + within].iter().sum::<f64>();
     // Most of the energy of a stretch of the spectrum is in a line.
-    let is_line = |of: &[f64]| 2.0 * sum(of, WIDTH) > sum(of, AROUND);
+    let is_line = |of: &[f64]| 2.0 * sum(of, width) > sum(of, around);
     if !is_line(&own) || is_line(&command) {
         return None;
     }
     let apart = 1.0 / length as f64;
-    let (cycles, mean_square) = refined(e, peak as f64 * apart, 1.0 / e.len() as f64);
-    let n = e.len() as f64;
-    let mean = e.iter().sum::<f64>() / n;
-    let all = e.iter().map(|e| (e - mean).powi(2)).sum::<f64>() / n;
+    let (cycles, mean_square) = refined(e, peak as f64 * apart, apart);
     Some(Line {
         hz: cycles / record.sample_period_s,
         mean_square,
-        all: all.max(f64::MIN_POSITIVE),
+        all: own.iter().sum::<f64>().max(f64::MIN_POSITIVE),
         apart: apart / record.sample_period_s,
     })
 }

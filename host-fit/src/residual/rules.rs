@@ -63,6 +63,11 @@ rules! {
     /// Level at which a band's spectrum must exceed that of the noise.
     band_level: f64 = 0.001, "p-value", "convention; tested in `pure_noise_explains_nothing`";
 
+    /// A steady oscillation: this many spectral lines on either side of a peak contain more than half of the energy of the
+    /// second number of lines on either side.
+    oscillation: [usize; 2] = [2, 24], "spectral lines", "a frequency between two lines is in both; the band of a resonance of damping \
+         0.01 at 50 Hz is 10 lines wide in a record of 10 s; tested at half and double";
+
     /// Level of the test for a trend from edge to edge.
     trend_level: f64 = 0.002, "p-value", "1 % over about five tests";
     /// Weaker correlations are not reported.

@@ -83,6 +83,12 @@ struct Channel<'a> {
     high: f64,
 }
 
+impl Channel<'_> {
+    fn keeps_its_sign(&self) -> bool {
+        self.low * self.high > 0.0
+    }
+}
+
 /// Up to four effects for each measured channel of `records`. One adds a response to the channel to the reading: a
 /// first-order lag with dead time of the channel's deviation from its first value, as a fraction of its range; at rest
 /// the channel has its first value and the response is 0. Two multiply the reading or the jets by a power of the channel,
@@ -189,7 +195,7 @@ starts = [1.0, -0.5]
 
 /// The reading, above the level that does not depend on the channel, times a power of the channel.
 fn scaled_by(channel: &Channel<'_>) -> Option<&'static Definition> {
-    if channel.low * channel.high <= 0.0 {
+    if !channel.keeps_its_sign() {
         return None;
     }
     let body = format!(
@@ -214,7 +220,7 @@ starts = [0.0, -2.0]
 
 /// The jets times a power of the channel.
 fn driven_by(channel: &Channel<'_>) -> Option<&'static Definition> {
-    if channel.low * channel.high <= 0.0 {
+    if !channel.keeps_its_sign() {
         return None;
     }
     let body = format!(
@@ -230,6 +236,12 @@ jet + numerator / denominator * jet"""
     ];
     of_channel(["driven-by", "jet"], channel, texts, &body)
 }
+
+/// The state that is 0 at the first sample of a record.
+const HAS_BEGUN: &str = r#"[[state]]
+name = "has_begun"
+update = "1.0"
+"#;
 
 /// The slowest speed counts as the fastest divided by this, because the delay must be bounded.
 const MOST_SLOWER: f64 = 5.0;
@@ -253,10 +265,7 @@ update = """
 if has_begun > 0.5 {{
     mean_speed + (1.0 - exp(-2.0 * period * mean_speed / (transit * reference))) * ({signal} - mean_speed)
 }} else {{ {signal} }}"""
-[[state]]
-name = "has_begun"
-update = "1.0"
-[[parameter]]
+{HAS_BEGUN}[[parameter]]
 name = "transit"
 unit = "s"
 low = 0.001
@@ -284,10 +293,7 @@ update = "if has_begun > 0.5 {{ first_value }} else {{ {signal} }}"
 name = "lagged"
 update = """
 lagged + (1.0 - exp(-period / lag)) * (delayed(({signal} - first_value) / {range:?}, dead_time) - lagged)"""
-[[state]]
-name = "has_begun"
-update = "1.0"
-[[parameter]]
+{HAS_BEGUN}[[parameter]]
 name = "gain"
 unit = "y"
 low = -5.0

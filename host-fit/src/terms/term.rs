@@ -286,7 +286,7 @@ impl Term {
             } => {
                 model.add(spec, parameters, *reference);
                 model.grading = *grading;
-                model.delay_later(-dead_time(spec, parameters, model.sample_period_s));
+                model.delay_later(-self.own_delay(parameters, model.sample_period_s));
             }
             Self::Offset => {
                 let level = coefficients.first().copied().unwrap_or(0.0);
@@ -309,8 +309,7 @@ impl Term {
             Self::Inertia(samples) => in_series(&mut model, *samples),
             Self::Path { spec, parameters } => {
                 model.add(spec, parameters, None);
-                let mean = mean_delay(spec, parameters, model.sample_period_s);
-                model.delay_later(-mean);
+                model.delay_later(-self.own_delay(parameters, model.sample_period_s));
             }
             lags => {
                 let Some(lag) = lags.lag() else {
@@ -336,6 +335,15 @@ impl Term {
         model
     }
 
+    /// The part of the delay that belongs to the term with these parameters, samples.
+    fn own_delay(&self, parameters: &[f64], period: f64) -> f64 {
+        match self {
+            Self::Path { spec, .. } => mean_delay(spec, parameters, period),
+            Self::Effect { spec, .. } => dead_time(spec, parameters, period),
+            _ => 0.0,
+        }
+    }
+
     /// The model without the term; a delay law is replaced by that of `base`.
     #[must_use]
     pub fn taken_from(&self, model: &Model, base: &Model) -> Model {
@@ -344,10 +352,10 @@ impl Term {
             Self::Effect { spec, .. } if spec.place == Place::Delay => {
                 take_delay_law(&mut model, &base.delay);
             }
-            Self::Effect { spec, .. } => {
+            Self::Path { spec, .. } | Self::Effect { spec, .. } => {
                 if let Some(at) = model.effects.iter().position(|e| e.name == spec.name) {
                     let added = model.effects.remove(at);
-                    let own = dead_time(spec, &added.parameters, model.sample_period_s);
+                    let own = self.own_delay(&added.parameters, model.sample_period_s);
                     model.delay_later(own);
                 }
             }
@@ -355,13 +363,6 @@ impl Term {
             Self::LevelRate => model.effects.retain(|e| e.name != LEVEL_RATE.name),
             Self::Wake(_) => model.effects.retain(|e| e.name != SLOW_WAKE.name),
             Self::Inertia(_) => out_of_series(&mut model),
-            Self::Path { spec, .. } => {
-                if let Some(at) = model.effects.iter().position(|e| e.name == spec.name) {
-                    let added = model.effects.remove(at);
-                    let mean = mean_delay(spec, &added.parameters, model.sample_period_s);
-                    model.delay_later(mean);
-                }
-            }
             lags => {
                 let of = |all: &[u16]| all.iter().position(|lag| Some(*lag) == lags.lag());
                 if lags.reads_states()

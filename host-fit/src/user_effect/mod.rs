@@ -521,23 +521,6 @@ update = "reading"
         error.to_string()
     }
 
-    /// Only a parameter in s of an effect at the jet is a dead time in series with the model's own.
-    #[test]
-    fn a_dead_time_is_a_time_of_the_jets() {
-        for (text, name) in [(ECHO, "gain"), (ECHO, "delay"), (PICKUP, "gain")] {
-            let text = text.replacen(
-                "expression",
-                &format!("dead_time = \"{name}\"\nexpression"),
-                1,
-            );
-            let error = Definition::from_toml(&text, "own.toml").expect_err(name);
-            assert!(error.to_string().contains("`dead_time` must be"), "{error}");
-        }
-        let text = ECHO.replacen("expression", "dead_time = \"echo_delay\"\nexpression", 1);
-        let own = Definition::from_toml(&text, "own.toml").expect("a time of the jets");
-        assert_eq!(own.spec().dead_time, Some("echo_delay"));
-    }
-
     #[test]
     fn what_is_outside_the_language_is_refused_with_its_column() {
         for (expression, column, why) in [

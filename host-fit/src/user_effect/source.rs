@@ -76,23 +76,41 @@ fn is_identifier(name: &str) -> bool {
         && syn::parse_str::<syn::Ident>(name).is_ok()
 }
 
-/// Signals of the language.
-const SIGNALS: [&str; 10] = [
-    "u",
-    "y",
-    "t",
-    "since_edge",
-    "period",
-    "jet",
-    "reading",
-    "arrived",
-    "relaxation",
-    "reference",
-];
+/// The mean of the channel, in expressions.
+const REFERENCE: &str = "reference";
+
+impl SourcePlace {
+    const ALL: [Self; 3] = [Self::Jet, Self::Flow, Self::Sensor];
+
+    /// The names of the signals in expressions of this place.
+    fn signals(self) -> Vec<(&'static str, Op)> {
+        let mut signals = vec![
+            ("u", Op::Signal(Signal::Command)),
+            ("y", Op::Signal(Signal::Flow)),
+            ("t", Op::Signal(Signal::Time)),
+            ("since_edge", Op::Signal(Signal::SinceEdge)),
+            ("period", Op::Period),
+        ];
+        match self {
+            Self::Jet => signals.push(("jet", Op::Signal(Signal::Own))),
+            Self::Flow => signals.extend([
+                ("arrived", Op::Signal(Signal::Arrived)),
+                ("relaxation", Op::Signal(Signal::Relaxation)),
+            ]),
+            Self::Sensor => signals.extend([
+                ("reading", Op::Signal(Signal::Own)),
+                ("arrived", Op::Signal(Signal::Arrived)),
+            ]),
+        }
+        signals
+    }
+}
 
 /// The name of a channel in expressions: its own, or `channel` if that is no free name of the language.
 pub(crate) fn channel_signal(channel: &str) -> &str {
-    if is_identifier(channel) && !SIGNALS.contains(&channel) {
+    let mut signals = SourcePlace::ALL.into_iter().flat_map(SourcePlace::signals);
+    let is_taken = channel == REFERENCE || signals.any(|(name, _)| name == channel);
+    if is_identifier(channel) && !is_taken {
         channel
     } else {
         "channel"
@@ -146,28 +164,11 @@ impl Source {
             return key("summary", "describe the effect in one line".to_owned());
         }
         let mut compiler = Compiler::default();
-        let mut signals = vec![
-            ("u", Op::Signal(Signal::Command)),
-            ("y", Op::Signal(Signal::Flow)),
-            ("t", Op::Signal(Signal::Time)),
-            ("since_edge", Op::Signal(Signal::SinceEdge)),
-            ("period", Op::Period),
-        ];
-        match self.place {
-            SourcePlace::Jet => signals.push(("jet", Op::Signal(Signal::Own))),
-            SourcePlace::Flow => signals.extend([
-                ("arrived", Op::Signal(Signal::Arrived)),
-                ("relaxation", Op::Signal(Signal::Relaxation)),
-            ]),
-            SourcePlace::Sensor => signals.extend([
-                ("reading", Op::Signal(Signal::Own)),
-                ("arrived", Op::Signal(Signal::Arrived)),
-            ]),
-        }
+        let mut signals = self.place.signals();
         if let Some(channel) = &self.channel {
             let name = channel_signal(channel);
             signals.push((name, Op::Signal(Signal::Channel)));
-            signals.push(("reference", Op::Reference));
+            signals.push((REFERENCE, Op::Reference));
         }
         let mut name = |label: String, name: &str, op: Op| {
             if !is_identifier(name) {
@@ -341,5 +342,39 @@ impl SourceParameter {
             return Err("`unit` must be a unit in words, or `-` for none".to_owned());
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::user_effect::Definition;
+
+    /// Only a parameter in s of an effect at the jet is a dead time in series with the model's own.
+    #[test]
+    fn a_dead_time_is_a_time_of_the_jets() {
+        let echo = |place: &str, own: &str, dead_time: &str| {
+            let text = format!(
+                r#"name = "own-echo"
+place = "{place}"
+summary = "it comes a second time, later"
+dead_time = "{dead_time}"
+expression = "{own} + gain * delayed({own}, echo_delay)"
+parameter = [
+    {{ name = "gain", unit = "-", low = -1.0, high = 1.0, starts = [0.2] }},
+    {{ name = "echo_delay", unit = "s", low = 0.02, high = 0.5, starts = [0.05] }},
+]"#
+            );
+            Definition::from_toml(&text, "own.toml").map(|own| own.spec().dead_time)
+        };
+        for (place, own, name) in [
+            ("jet", "jet", "gain"),
+            ("jet", "jet", "delay"),
+            ("sensor", "reading", "echo_delay"),
+        ] {
+            let error = echo(place, own, name).expect_err(name).to_string();
+            assert!(error.contains("`dead_time` must be"), "{error}");
+        }
+        let own = echo("jet", "jet", "echo_delay").expect("a time of the jets");
+        assert_eq!(own, Some("echo_delay"));
     }
 }

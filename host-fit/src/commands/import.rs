@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use host_fit::data::import::{Import, Mapping};
+use host_fit::data::import::{Import, Mapping, Marker};
 use host_fit::steps::{self, ImportedSet};
 
 use super::Console;
@@ -13,7 +13,8 @@ use super::average::positive;
 ///
 /// Each FILE becomes one record named by the file; a folder stands for the files in it. Recognised are: separators,
 /// decimal commas, thousands marks, lines before the header, dates and clock times, Unix times in s, ms or µs,
-/// on/off and true/false, percentages, and a command that is written on change only. The interpretation is printed.
+/// on/off and true/false, percentages, a command that is written on change only, and tables with one signal in each row
+/// (time, name, value). The interpretation is printed.
 /// A variable is named as in its program: valve, run.valve, data(:,2), data[:,1]. Variables without an option are
 /// found by their names (t, time or timestamp; u, input, heater, valve …; y, output, temperature …). y_sd, y_min,
 /// y_max and every other variable of the same length are kept. The mapping is stored in dataset.toml, for --like.
@@ -49,6 +50,9 @@ pub(crate) struct Args {
     /// rows are interpolated, u keeps its value.
     #[arg(long, value_name = "SECONDS", value_parser = positive)]
     fill_gaps: Option<f64>,
+    /// The number that marks missing readings, such as -9999; none: every number is a reading.
+    #[arg(long, value_name = "VALUE", allow_negative_numbers = true)]
+    missing: Option<Marker>,
     /// A file has several records: a new one begins where this variable changes (the number of a run), or, if it is
     /// the time, where the time starts again and after a pause.
     #[arg(long, value_name = "NAME")]
@@ -133,6 +137,7 @@ impl Args {
             period_s: self.period.or(base.period_s),
             ignore_time: self.ignore_time || base.ignore_time,
             fill_gaps_s: self.fill_gaps.or(base.fill_gaps_s),
+            missing: self.missing.or(base.missing),
             split_by: self.split_by.clone().or(base.split_by),
             mean_of: self.mean_of.or(base.mean_of),
             u: self.u.clone().or(base.u),

@@ -228,7 +228,9 @@ impl Rows {
                 _ => line.trim_start_matches(marks),
             };
             let mut cells = self.separator.split_header(line);
-            while cells.len() > width && cells.last().is_some_and(String::is_empty) {
+            // LabVIEW names a column of comments that no row has.
+            let no_column = |name: &String| name.is_empty() || name == "Comment";
+            while cells.len() > width && cells.last().is_some_and(no_column) {
                 cells.pop();
             }
             if let Some(at) = joined

@@ -8,7 +8,9 @@ mod column;
 mod delimited;
 mod gaps;
 mod labelled;
+mod long;
 mod mapping;
+mod marker;
 mod mat;
 mod mean;
 mod names;
@@ -22,6 +24,7 @@ mod text;
 mod timing;
 
 pub use mapping::{Mapping, near_two_levels};
+pub use marker::{Marker, NoMarker};
 pub use problem::ImportProblem;
 pub use source::{Source, Variable};
 use split::Part;

@@ -37,6 +37,12 @@ fn usual(name: &str) -> String {
     }
 }
 
+/// Whether a name is one of the `known` ones.
+pub(super) fn is_known(known: &str, name: &str) -> bool {
+    let name = usual(name);
+    known.split_whitespace().any(|known| known == name)
+}
+
 /// A name without a trailing unit or kind: `heater_pct`, `temp_c`, `valve_state`.
 fn stem(name: &str) -> String {
     const ENDS: [&str; 16] = [

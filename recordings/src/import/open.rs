@@ -1,18 +1,21 @@
 //! Selection of the reader by a file's first bytes.
 
+use std::borrow::Cow;
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
+use flate2::read::MultiGzDecoder;
+
 use super::problem::ImportProblem;
-use super::source::{Budget, Source, fault};
+use super::source::{Budget, Source, damaged, fault};
 use super::{mat, npy, text};
 use crate::error::{DataError, FilePlace};
 use crate::memory;
 
 impl Source {
-    /// Reads the variables of a CSV of any dialect, a MATLAB file (v5 to v7) or NumPy's `.npy` and `.npz`. The
-    /// format is determined by the first bytes, not by the name.
+    /// Reads the variables of a CSV of any dialect, a MATLAB file (v5 to v7) or NumPy's `.npy` and `.npz`, packed by gzip
+    /// or not. The format is determined by the first bytes, not by the name.
     ///
     /// # Errors
     /// [`DataError`] naming the file, and line, column or variable if there is one.
@@ -38,6 +41,8 @@ impl Source {
         budget
             .take(bytes.len() as u64, || "its content".to_owned())
             .map_err(|e| in_file(e, path))?;
+        let bytes = unpacked(bytes, &mut budget).map_err(|e| in_file(e, path))?;
+        let bytes = &*bytes;
         let is_mat = path
             .extension()
             .is_some_and(|e| e.eq_ignore_ascii_case("mat"));
@@ -61,6 +66,21 @@ impl Source {
         source.path = path.to_path_buf();
         Ok(source)
     }
+}
+
+/// The content of a file that is packed by gzip.
+fn unpacked<'a>(bytes: &'a [u8], budget: &mut Budget) -> Result<Cow<'a, [u8]>, DataError> {
+    if !bytes.starts_with(b"\x1f\x8b") {
+        return Ok(Cow::Borrowed(bytes));
+    }
+    let mut inner = Vec::new();
+    // Reading takes at least as much again.
+    MultiGzDecoder::new(bytes)
+        .take(memory::limit() / 2 + 1)
+        .read_to_end(&mut inner)
+        .map_err(|_| damaged("it cannot be unpacked"))?;
+    budget.take(inner.len() as u64, || "its unpacked content".to_owned())?;
+    Ok(Cow::Owned(inner))
 }
 
 fn in_file(mut error: DataError, path: &Path) -> DataError {
@@ -89,4 +109,24 @@ fn read(path: &Path, taken: u64) -> Result<Vec<u8>, DataError> {
         .take(bytes.len() as u64, || "its content".to_owned())
         .map_err(|e| in_file(e, path))?;
     Ok(bytes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use flate2::Compression;
+    use flate2::write::GzEncoder;
+    use std::io::Write;
+
+    #[test]
+    fn a_packed_table_is_read() {
+        let mut packed = GzEncoder::new(Vec::new(), Compression::fast());
+        packed.write_all(b"t,u,y\n0,0,1\n1,1,2\n").expect("packed");
+        let packed = packed.finish().expect("packed");
+        let read = |bytes: &[u8]| Source::read(Path::new("log.csv.gz"), bytes);
+        let source = read(&packed).expect("a table");
+        assert_eq!(source.variables[2].values, [1.0, 2.0]);
+        let cut = read(&packed[..packed.len() / 2]).expect_err("cut short");
+        assert!(cut.to_string().contains("damaged or cut short"), "{cut}");
+    }
 }

@@ -60,6 +60,21 @@ pub enum ImportProblem {
         what = .0
     )]
     Missing(&'static str),
+    /// A number that is probably the mark of a missing reading.
+    #[error(
+        "{mark} occurs in {count} row(s), and all other values lie between {low} and {high}: if it marks missing readings, \
+             give --missing {mark} --fill-gaps SECONDS, otherwise --missing none"
+    )]
+    Marker {
+        /// The number.
+        mark: f64,
+        /// Rows with this number.
+        count: usize,
+        /// Lowest of the other values.
+        low: f64,
+        /// Highest of the other values.
+        high: f64,
+    },
     /// A missing value before the first or after the last value of its variable.
     #[error(
         "the value is missing at the {at} of the record, and --fill-gaps fills only between two values; fill \

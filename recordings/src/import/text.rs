@@ -6,6 +6,7 @@ use super::cell::Marks;
 use super::column::Column;
 use super::delimited::{Rows, Separator, is_comment};
 use super::labelled::{Labels, arrows, leading};
+use super::long::widened;
 use super::problem::ImportProblem;
 use super::source::{Budget, Source, fault};
 use super::stamp::Stamp;
@@ -109,18 +110,57 @@ pub(super) fn variables(bytes: &[u8], budget: &mut Budget) -> Result<Source, Dat
         "its text".to_owned()
     })?;
     let text = decode(bytes)?;
-    let mut lines: Vec<&str> = text.lines().collect();
+    let lines: Vec<&str> = text.lines().collect();
     let is_cut = !text.ends_with('\n');
+    if let Some(rows) = Rows::find(&lines)
+        && let Some(wide) = widened(&rows, &lines, budget)?
+    {
+        let size = wide.lines.iter().map(String::len).sum::<usize>() as u64;
+        budget.take(size + wide.lines.len() as u64 * LINE, || {
+            "its signals as columns".to_owned()
+        })?;
+        let lines: Vec<&str> = wide.lines.iter().map(String::as_str).collect();
+        let table = Layout::Table(Rows {
+            separator: Separator::Tab,
+            first: 1,
+            width: lines[0].split('\t').count(),
+        });
+        let mut source = table_of(lines, Some((table, &wide.numbers)), false, budget)?;
+        source.dialect = source.dialect.replace(
+            Separator::Tab.words(),
+            &format!("{}, one signal a row", rows.separator.words()),
+        );
+        source.remarks.splice(0..0, wide.remarks);
+        return Ok(source);
+    }
+    table_of(lines, None, is_cut, budget)
+}
+
+/// The columns of a table with these lines; `known` are its layout and the lines' numbers in the file, if these are not
+/// those of `lines`.
+fn table_of(
+    mut lines: Vec<&str>,
+    known: Option<(Layout, &[u64])>,
+    is_cut: bool,
+    budget: &mut Budget,
+) -> Result<Source, DataError> {
     let parted = arrows(&lines).or_else(|| Labels::of(&lines).and_then(|_| leading(&lines)));
     let stamps = parted.map(|parted| {
         lines = parted.iter().map(|(_, rest)| *rest).collect();
         let stamps = parted.iter().map(|(stamp, _)| *stamp);
         stamps.collect::<Vec<&str>>()
     });
-    let layout = Layout::of(&lines)?;
+    let (layout, numbers) = match known {
+        Some((layout, numbers)) => (layout, Some(numbers)),
+        None => (Layout::of(&lines)?, None),
+    };
+    let number = |at: usize| match numbers {
+        Some(numbers) => numbers.get(at).copied().unwrap_or(0),
+        None => at as u64 + 1,
+    };
     let width = layout.width();
     if width > WIDEST {
-        let here = FilePlace::default().at_line(layout.first() as u64 + 1);
+        let here = FilePlace::default().at_line(number(layout.first()));
         return Err(here.error(ImportProblem::TooWide(width).into()));
     }
     let cells = (lines.len() - layout.first()) as u64 * width as u64;
@@ -132,7 +172,7 @@ pub(super) fn variables(bytes: &[u8], budget: &mut Budget) -> Result<Source, Dat
     let mut before = HashSet::new();
     for name in &names {
         if !before.insert(name) {
-            let header = FilePlace::default().at_line(layout.first() as u64);
+            let header = FilePlace::default().at_line(number(layout.first().saturating_sub(1)));
             let header = header.in_column(name);
             return Err(header.error(DataProblem::DoubledColumn));
         }
@@ -154,7 +194,7 @@ pub(super) fn variables(bytes: &[u8], budget: &mut Budget) -> Result<Source, Dat
     let mut columns = vec![Column::default(); names.len()];
     let mut monitor = Column::default();
     for &at in &rows {
-        let line = at as u64 + 1;
+        let line = number(at);
         layout.split(lines.get(at).copied().unwrap_or_default(), &mut cells);
         for (index, (cell, column)) in cells.iter().zip(&mut columns).enumerate() {
             match joined(&cells, index) {
@@ -351,6 +391,9 @@ mod tests {
         expect(&lab, &["Time", "Valve", "Shear"], &[2.0, 5.0, 3.0]);
         assert_eq!(lab.variables[1].unit.as_deref(), Some("V"));
         assert_eq!(lab.lines, [6, 7, 8]);
+        let exported =
+            read("***End_of_Header***\nX_Value\tValve\tFilm\tComment\n0\t0\t1\n1\t5\t2\n");
+        expect(&exported, &["X_Value", "Valve", "Film"], &[1.0, 5.0, 2.0]);
         let bare = read("0 1\n1 2\n");
         expect(&bare, &["column 1", "column 2"], &[1.0, 2.0]);
     }

@@ -52,8 +52,8 @@ impl Command {
                  ramp seed target"
             }
             Self::Import => {
-                "channel fill-gaps graded hold-out-from ignore-time mean-of no-channels period split-by t \
-                 t-scale title u u-before u-offset u-scale u-threshold validate y y-offset y-scale"
+                "channel fill-gaps graded hold-out-from ignore-time mean-of missing no-channels period split-by \
+                 t t-scale title u u-before u-offset u-scale u-threshold validate y y-offset y-scale"
             }
         };
         all.split_whitespace()

@@ -336,5 +336,11 @@ fn likeness(separator: Separator, cells: &[&str]) -> Likeness {
 
 fn is_header_unit(text: &str) -> bool {
     let bracketed = |open, close| text.starts_with(open) && text.ends_with(close);
-    bracketed('[', ']') || bracketed('(', ')') || text == "-" || is_unit(text)
+    // Oscilloscopes write out the units.
+    const WORDS: [&str; 13] = [
+        "second", "seconds", "sec", "volt", "volts", "ampere", "amperes", "amps", "pascal",
+        "celsius", "kelvin", "hertz", "percent",
+    ];
+    let is_word = WORDS.iter().any(|word| text.eq_ignore_ascii_case(word));
+    bracketed('[', ']') || bracketed('(', ')') || text == "-" || is_word || is_unit(text)
 }

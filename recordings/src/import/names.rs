@@ -7,7 +7,7 @@ use super::source::{Source, Variable};
 use crate::error::{DataError, FilePlace};
 
 /// Usual names of the time; these lists are in the order of priority.
-pub(super) const TIMES: &str = "t time zeit temps tout x_value time_s t_s sec secs seconds elapsed elapsed_s elapsed_time \
+pub(super) const TIMES: &str = "t time zeit temps tout x_value x_axis time_s t_s sec secs seconds elapsed elapsed_s elapsed_time \
     time_ms t_ms elapsed_ms millis milliseconds ms time_us t_us micros microseconds us \
     time_min t_min timestamp timestamps time_stamp timestamp_ms timestamp_us datetime \
     date_time date_and_time zeitstempel epoch epoch_s epoch_ms epoch_us unixtime unix_time unix unix_s unix_ms \
@@ -171,7 +171,7 @@ pub(super) fn seconds_by_name(name: &str) -> Option<f64> {
 /// Seconds in a unit of time.
 pub(super) fn seconds(unit: &str) -> Option<f64> {
     Some(match unit {
-        "s" | "sec" | "S" | "seconds" => 1.0,
+        "s" | "sec" | "S" | "second" | "Second" | "seconds" | "Seconds" => 1.0,
         "ms" | "msec" => 1e-3,
         "us" | "µs" | "μs" => 1e-6,
         "ns" => 1e-9,

@@ -394,6 +394,9 @@ mod tests {
         let exported =
             read("***End_of_Header***\nX_Value\tValve\tFilm\tComment\n0\t0\t1\n1\t5\t2\n");
         expect(&exported, &["X_Value", "Valve", "Film"], &[1.0, 5.0, 2.0]);
+        let scope = read("x-axis,1,2\nsecond,Volt,Volt\n+0.0E+00,0,1\n+1.0E-03,5,2\n");
+        expect(&scope, &["x-axis", "1", "2"], &[1e-3, 5.0, 2.0]);
+        assert_eq!(scope.variables[2].unit.as_deref(), Some("Volt"));
         let bare = read("0 1\n1 2\n");
         expect(&bare, &["column 1", "column 2"], &[1.0, 2.0]);
     }

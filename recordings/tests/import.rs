@@ -8,7 +8,7 @@ use proptest::prelude::*;
 use recordings::DataSet;
 use recordings::import::{Import, Imported, Mapping, import};
 
-const FILES: [&str; 13] = [
+const FILES: [&str; 14] = [
     "v5.mat",
     "v7.mat",
     "struct.mat",
@@ -21,6 +21,7 @@ const FILES: [&str; 13] = [
     "matrix.npy",
     "rows.npy",
     "german.csv",
+    "long.csv",
     "tabs.txt",
 ];
 

@@ -36,6 +36,12 @@ with open(here / "german.csv", "w", encoding="latin-1", newline="\r\n") as out:
     out.write("Messung 7\n\nZeit [ms];Ventil [V];y [Pa];u_inf [m/s];T [°C]\n")
     for row in zip(k, valve, shear, wind):
         out.write(";".join([str(row[0]), *map(comma, row[1:]), "20,5"]) + "\n")
+with open(here / "long.csv", "w", newline="\n") as out:
+    out.write("entity_id,state,last_changed\n")
+    for i in range(n):
+        if i % 4 == 0:
+            out.write(f"switch.valve,{'on' if i % 8 else 'off'},2026-03-29T00:00:{i:02d}Z\n")
+        out.write(f"sensor.shear,{shear[i]},2026-03-29T00:00:{i:02d}.5Z\n")
 with open(here / "tabs.txt", "w", encoding="utf-16") as out:
     out.write("Time\tValve\tShear\nms\tV\tPa\n")
     for row in zip(k, valve, shear):

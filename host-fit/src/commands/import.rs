@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use host_fit::data::import::{Import, Mapping, Marker};
+use host_fit::data::import::{Import, Mapping};
 use host_fit::steps::{self, ImportedSet};
 
 use super::Console;
@@ -50,9 +50,9 @@ pub(crate) struct Args {
     /// rows are interpolated, u keeps its value.
     #[arg(long, value_name = "SECONDS", value_parser = positive)]
     fill_gaps: Option<f64>,
-    /// The number that marks missing readings, such as -9999; none: every number is a reading.
-    #[arg(long, value_name = "VALUE", allow_negative_numbers = true)]
-    missing: Option<Marker>,
+    /// A number that marks missing readings, such as -9999, or none: every number is a reading; repeatable.
+    #[arg(long, value_name = "VALUE", allow_negative_numbers = true, value_parser = mark)]
+    missing: Vec<Option<f64>>,
     /// A file has several records: a new one begins where this variable changes (the number of a run), or, if it is
     /// the time, where the time starts again and after a pause.
     #[arg(long, value_name = "NAME")]
@@ -106,6 +106,16 @@ pub(crate) struct Args {
     title: Option<String>,
 }
 
+/// A number, or nothing for `none`.
+fn mark(text: &str) -> Result<Option<f64>, String> {
+    if text == "none" {
+        return Ok(None);
+    }
+    let number = text.parse().ok().filter(|number: &f64| number.is_finite());
+    let number = number.ok_or("give a number, such as -9999, or none")?;
+    Ok(Some(number))
+}
+
 impl Args {
     /// The data set made from the files.
     pub(super) fn import(&self) -> anyhow::Result<ImportedSet> {
@@ -131,13 +141,17 @@ impl Args {
             (false, []) => base.channels,
             (false, names) => Some(names.to_vec()),
         };
+        let missing = match self.missing.as_slice() {
+            [] => base.missing,
+            marks => Some(marks.iter().copied().flatten().collect()),
+        };
         Ok(Mapping {
             t: self.t.clone().or(base.t),
             t_scale: self.t_scale.or(base.t_scale),
             period_s: self.period.or(base.period_s),
             ignore_time: self.ignore_time || base.ignore_time,
             fill_gaps_s: self.fill_gaps.or(base.fill_gaps_s),
-            missing: self.missing.or(base.missing),
+            missing,
             split_by: self.split_by.clone().or(base.split_by),
             mean_of: self.mean_of.or(base.mean_of),
             u: self.u.clone().or(base.u),

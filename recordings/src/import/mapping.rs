@@ -6,7 +6,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use super::gaps::{Filling, Gaps};
-use super::marker::{self, Marker};
+use super::marker;
 use super::mean::{mean_of, origin_of};
 use super::names::{
     COMMANDS, CONTROLLER_OUTPUTS, OUTPUTS, PROCESS_VALUES, TIMES, find, is_in_percent, known_as,
@@ -38,9 +38,10 @@ pub struct Mapping {
     /// Longest gap that is filled, s, from the value before it to the value after it; `None`: no gap is filled.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fill_gaps_s: Option<f64>,
-    /// The number that marks missing readings of y and of further variables; `None`: a usual one is an error.
+    /// The numbers that mark missing readings of y and of further variables. A usual mark that is not among them is an
+    /// error, unless the list is empty.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub missing: Option<Marker>,
+    pub missing: Option<Vec<f64>>,
     /// Name of the variable at whose changes a new record begins; the name of the time: where the time starts again, and
     /// after pauses. `None`: a file is one record.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -264,7 +265,7 @@ impl Mapping {
             rows: timing.rows,
         };
         let interpolated = |variable: &Variable, remarks: &mut Vec<String>| {
-            let values = marker::without(variable, self.missing)
+            let values = marker::without(variable, self.missing.as_deref())
                 .map_err(|(row, problem)| place(variable, row).error(problem.into()))?;
             gaps.filled(variable, &values, Filling::Interpolated, &place, remarks)
         };

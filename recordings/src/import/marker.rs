@@ -1,7 +1,5 @@
 //! Numbers that loggers write in place of a missing reading.
 
-use serde::{Deserialize, Serialize};
-
 use super::problem::ImportProblem;
 use super::source::Variable;
 
@@ -29,60 +27,26 @@ const USUAL: [f64; 20] = [
     85.0,
 ];
 
-/// The numbers that are missing readings.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(untagged)]
-pub enum Marker {
-    /// This number.
-    Number(f64),
-    /// Every number is a reading.
-    None(NoMarker),
-}
-
-/// The word for [`Marker::None`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum NoMarker {
-    /// `none`.
-    None,
-}
-
-impl std::str::FromStr for Marker {
-    type Err = String;
-
-    /// A finite number or `none`.
-    fn from_str(text: &str) -> Result<Self, String> {
-        if text == "none" {
-            return Ok(Self::None(NoMarker::None));
-        }
-        let number = text.parse().ok().filter(|number: &f64| number.is_finite());
-        let number = number.ok_or("give a number, such as -9999, or none")?;
-        Ok(Self::Number(number))
-    }
-}
-
-/// The values of a variable, NaN where they are the `marker`.
+/// The values of a variable, NaN where they are one of the `marks`.
 ///
 /// # Errors
-/// Without a marker: the first row with a number that is probably one.
+/// The first row with a number that is probably another mark; none if `marks` is an empty list.
 pub(super) fn without(
     variable: &Variable,
-    marker: Option<Marker>,
+    marks: Option<&[f64]>,
 ) -> Result<Vec<f64>, (usize, ImportProblem)> {
     let mut values = variable.values.clone();
-    match marker {
-        Some(Marker::Number(mark)) => {
-            let marked = values.iter_mut().filter(|value| **value == mark);
-            marked.for_each(|value| *value = f64::NAN);
-        }
-        Some(Marker::None(_)) => {}
-        None => {
-            if let Some(fault) = USUAL.iter().find_map(|mark| suspected(&values, *mark)) {
-                return Err(fault);
-            }
+    for value in &mut values {
+        if marks.is_some_and(|marks| marks.contains(value)) {
+            *value = f64::NAN;
         }
     }
-    Ok(values)
+    // With an empty list every number is a reading.
+    let may_be_marks = marks.is_none_or(|marks| !marks.is_empty());
+    match USUAL.iter().find_map(|mark| suspected(&values, *mark)) {
+        Some(fault) if may_be_marks => Err(fault),
+        _ => Ok(values),
+    }
 }
 
 /// Whether a number is probably no reading: it is farther from all other values than these are from each other.
@@ -129,11 +93,13 @@ mod tests {
         assert_eq!(row, 2);
         let words = problem.to_string();
         assert!(words.contains("--missing -127"), "{words}");
-        let given = |text: &str| without(&oven, Some(text.parse().expect("a marker")));
-        let left = given("-127").expect("values");
-        assert!(left[2].is_nan() && left[4] == 85.0);
-        assert_eq!(given("none").expect("values"), oven.values);
-        assert!("inf".parse::<Marker>().is_err() && "".parse::<Marker>().is_err());
+        let given = |marks: &[f64]| without(&oven, Some(marks));
+        let left = given(&[-127.0, 85.0]).expect("values");
+        assert!(left[2].is_nan() && left[4].is_nan() && left[5] == 30.0);
+        assert_eq!(given(&[]).expect("values"), oven.values);
+        // The thermometer's second mark is suspected beside the first.
+        let (row, _) = given(&[-127.0]).expect_err("suspected");
+        assert_eq!(row, 4);
     }
 
     #[test]

@@ -24,7 +24,6 @@ mod text;
 mod timing;
 
 pub use mapping::{Mapping, near_two_levels};
-pub use marker::{Marker, NoMarker};
 pub use problem::ImportProblem;
 pub use source::{Source, Variable};
 use split::Part;

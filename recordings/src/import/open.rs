@@ -79,7 +79,10 @@ fn unpacked<'a>(bytes: &'a [u8], budget: &mut Budget) -> Result<Cow<'a, [u8]>, D
         .take(memory::limit() / 2 + 1)
         .read_to_end(&mut inner)
         .map_err(|_| damaged("it cannot be unpacked"))?;
-    budget.take(inner.len() as u64, || "its unpacked content".to_owned())?;
+    // A longer content was cut.
+    let size = inner.len() as u64;
+    budget.take(2 * size, || "its unpacked content".to_owned())?;
+    budget.give(size);
     Ok(Cow::Owned(inner))
 }
 

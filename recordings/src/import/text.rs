@@ -144,7 +144,11 @@ fn table_of(
     is_cut: bool,
     budget: &mut Budget,
 ) -> Result<Source, DataError> {
-    let parted = arrows(&lines).or_else(|| Labels::of(&lines).and_then(|_| leading(&lines)));
+    let labelled = || Labels::of(&lines).and_then(|_| leading(&lines));
+    let parted = match known {
+        Some(_) => None,
+        None => arrows(&lines).or_else(labelled),
+    };
     let stamps = parted.map(|parted| {
         lines = parted.iter().map(|(_, rest)| *rest).collect();
         let stamps = parted.iter().map(|(stamp, _)| *stamp);

@@ -5,6 +5,7 @@ use super::bench::Bench;
 use super::evidence::p_value;
 use super::hypothesis::Hypothesis;
 use super::judge::{Judge, Judged};
+use super::laws::at_other_averages;
 use super::likely_delay::at_the_likely_delay;
 use super::linear::{self, second_order};
 use super::search::{Found, Search};
@@ -24,10 +25,6 @@ use std::sync::atomic::{AtomicBool, Ordering};
 const LEVEL: f64 = 0.6;
 /// Least difference between the delay of the attached flow and the delay at rest, samples.
 const LEAST_RISE: f64 = 4.0;
-
-/// Averaging times of y that are tried with a delay law in addition to that of eq. (1), samples. A flow that
-/// carries the jets with its present velocity needs no averaging.
-const AVERAGES: [u32; 3] = [2, 50, 125];
 
 /// A base model and the effort of its search.
 #[derive(Clone, Debug)]
@@ -115,6 +112,13 @@ pub fn base_model(
         }
     }
     let by_score = |a: &&Hypothesis, b: &&Hypothesis| a.judged.size().total_cmp(&b.judged.size());
+    progress("averaging times of the delay law");
+    let averaged = roots
+        .iter()
+        .map(|root| root.judged.model())
+        .filter(|model| model.delay.follows_y())
+        .flat_map(|model| at_other_averages(&judge, model, std::slice::from_ref(&model.delay)));
+    let averaged = averaged.min_by(|a, b| a.size().total_cmp(&b.size()));
     progress("first and second order with dead time");
     let linear = match may_be_constant {
         true => linear::baselines(&given, &judge.learning(0)),
@@ -134,7 +138,18 @@ pub fn base_model(
     let root = Hypothesis::new(without_needless_law(&judge, root.judged.clone(), laws));
     progress("second order with the same delay");
     let second = second_order(&judge, &root, may_be_constant);
+    // The averaging time is a parameter and must lower the error like every other parameter.
+    let averaged = averaged.filter(|averaged| averaged.size() + RULES.price < root.judged.size());
     let mut found = search.run(root, Some(&|| second.iter().cloned().collect()));
+    // Lags that were found at another averaging time can stand for the law.
+    if let Some(averaged) = averaged {
+        let other = search.run(Hypothesis::new(averaged), None);
+        let tried = found.tried + other.tried;
+        if other.best.score() < found.best.score() {
+            found = other;
+        }
+        found.tried = tried;
+    }
     // Input coefficients of both signs (a zero, as of an inverse response) are outside first and second order. If
     // such a model is clearly better than the best structure so far, the search starts again from it.
     let lead = |hypothesis: &&Hypothesis| {
@@ -182,12 +197,8 @@ pub fn base_model(
         progress("averaging times of the delay law");
         let own = found.best.judged.model();
         let lawful = others.iter().chain([&own.delay]);
-        let averaged = lawful.filter(|law| law.follows_y());
-        let tried: Vec<Model> = averaged
-            .flat_map(|law| AVERAGES.map(|window| with_average(own, law, window)))
-            .collect();
-        let tried = parallel::some(&tried, |model| judge.refitted(model).ok());
-        let best = tried
+        let lawful: Vec<Delay> = lawful.filter(|law| law.follows_y()).cloned().collect();
+        let best = at_other_averages(&judge, own, &lawful)
             .into_iter()
             .min_by(|a, b| a.size().total_cmp(&b.size()));
         // The averaging time is a parameter and must lower the error like every other parameter.
@@ -329,23 +340,6 @@ fn without_needless_law(judge: &Judge, judged: Judged, laws: &[Delay]) -> Judged
     }
 }
 
-/// The model with a delay law that depends on the mean of y over `window` samples. The levels of the law follow ỹ, which
-/// is (W − 1)/W of a constant y by eq. (1).
-fn with_average(model: &Model, law: &Delay, window: u32) -> Model {
-    let mut other = model.clone();
-    if !model.delay.is_alike(law) {
-        take_delay_law(&mut other, law);
-    }
-    let share = |window: u32| 1.0 - 1.0 / f64::from(window.max(2));
-    let ratio = share(window) / share(model.averaging.window);
-    if let Delay::Law(law) = &mut other.delay {
-        let parameters = law.parameters.iter_mut().zip(law.spec.parameters);
-        parameters.for_each(|(value, card)| *value *= card.unit.scale(ratio, 1.0, 1.0));
-    }
-    other.averaging.window = window;
-    other
-}
-
 /// The saturating delay law that is closest to the law of `model`.
 fn saturating(model: &Model) -> Delay {
     let at = |level: f64| model.delay.present(level, model.sample_period_s);
@@ -372,25 +366,6 @@ mod tests {
     use model_core::effects::SENSOR_RESONANCE;
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
-
-    /// The law's level is 0.6 of a constant y at any averaging time.
-    #[test]
-    fn another_averaging_time_keeps_the_delay_at_a_constant_y() {
-        let model = Model {
-            delay: Delay::of::<SaturatingDelay<f64>>(&[20.0, 10.0, 0.6, 0.0], vec![1.0], true),
-            ..Model::default()
-        };
-        let delay = |window: u32, y: f64| {
-            let other = with_average(&model, &model.delay, window);
-            assert_eq!(other.averaging.window, window);
-            let mean = y * (1.0 - 1.0 / f64::from(window));
-            other.delay.present(mean, model.sample_period_s)
-        };
-        for y in [0.1, 0.3, 0.5] {
-            let [short, long] = [2, model.averaging.window].map(|window| delay(window, y));
-            assert!((short - long).abs() < 1e-9, "{y}: {short} {long}");
-        }
-    }
 
     #[test]
     fn a_model_that_diverges_gives_way_to_the_next_one() {

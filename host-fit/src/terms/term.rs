@@ -89,9 +89,11 @@ impl Term {
         let frame = |model: &Model| {
             let names: Vec<String> = model.effects.iter().map(|e| e.name.clone()).collect();
             let lags = (model.state_lags.clone(), model.product_lags.clone());
+            let averaging = model.averaging;
+            let follows_y = model.delay.follows_y() || averaging.averaged_model;
             (
                 model.convention,
-                model.averaging,
+                follows_y.then_some(averaging),
                 model.b.len(),
                 lags,
                 names,

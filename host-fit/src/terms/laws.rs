@@ -22,7 +22,12 @@ impl Search<'_> {
         hypothesis: &Hypothesis,
         forgotten: &[String],
     ) -> Option<Hypothesis> {
-        let best = self.with_best_law(hypothesis.judged.model(), forgotten)?;
+        let own = hypothesis.judged.model();
+        let is_known = |with: &Model| {
+            let law = with.delay.effect_name();
+            !forgotten.iter().any(|name| Some(name.as_str()) == law)
+        };
+        let best = self.with_best_law(own, is_known)?;
         let pays = best.size() < hypothesis.judged.size();
         pays.then(|| Hypothesis {
             terms: hypothesis.terms.clone(),
@@ -36,8 +41,16 @@ impl Search<'_> {
         if judged.model().delay.follows_y() || judged.model().averaging.averaged_model {
             return judged;
         }
-        if let Some(best) = self.with_best_law(judged.model(), &[]) {
-            let averaging = best.model().averaging;
+        let depends = |with: &Model| {
+            let at = |y: f64| with.delay.present(y, with.sample_period_s);
+            at(0.0) != at(1.0)
+        };
+        if let Some(best) = self.with_best_law(judged.model(), depends) {
+            let own = best.model();
+            let others = at_other_averages(self.judge, own, std::slice::from_ref(&own.delay));
+            let all = others.into_iter().chain([best]);
+            let best = all.min_by(|a, b| a.rmse().total_cmp(&b.rmse()));
+            let averaging = best.map_or(judged.model().averaging, |best| best.model().averaging);
             judged
                 .fits
                 .iter_mut()
@@ -46,26 +59,19 @@ impl Search<'_> {
         judged
     }
 
-    /// `model` with the delay law of the catalogue and the averaging time that fit best.
-    fn with_best_law(&self, model: &Model, forgotten: &[String]) -> Option<Judged> {
+    /// `model` with the best-fitting delay law of the catalogue among those that are `wanted`.
+    fn with_best_law(&self, model: &Model, wanted: impl Fn(&Model) -> bool) -> Option<Judged> {
         let facts = self.known.facts(model, 1.0, 1.0);
         let mut starts = Vec::new();
         for spec in model.candidates().filter(|spec| spec.place == Place::Delay) {
-            if !forgotten.iter().any(|name| name == spec.name) {
-                let rows = rows(spec, &facts).unwrap_or_default();
-                starts.extend(rows.into_iter().map(|row| (spec, row)));
+            for row in rows(spec, &facts).unwrap_or_default() {
+                let mut with = model.clone();
+                with.add(spec, &row, None);
+                starts.extend(wanted(&with).then_some(with));
             }
         }
-        let tried = parallel::some(starts, |(spec, parameters)| {
-            let mut with = model.clone();
-            with.add(spec, &parameters, None);
-            self.judge.refitted(&with).ok()
-        });
-        let by_rmse = |a: &Judged, b: &Judged| a.rmse().total_cmp(&b.rmse());
-        let best = tried.into_iter().min_by(by_rmse)?;
-        let own = best.model();
-        let averaged = at_other_averages(self.judge, own, std::slice::from_ref(&own.delay));
-        averaged.into_iter().chain([best]).min_by(by_rmse)
+        let tried = parallel::some(&starts, |with| self.judge.refitted(with).ok());
+        (tried.into_iter()).min_by(|a, b| a.rmse().total_cmp(&b.rmse()))
     }
 }
 

@@ -66,7 +66,6 @@ impl Search<'_> {
             (self.progress)("fitting again with another delay law");
             let with_law = Model {
                 delay: other.judged.model().delay.clone(),
-                averaging: other.judged.model().averaging,
                 ..model.clone()
             };
             if let Ok(root) = (given.root)(&with_law) {

@@ -363,9 +363,70 @@ fn on_samples_unless_it_costs(judge: &Judge, judged: Judged) -> Judged {
 mod tests {
     use super::*;
     use crate::data::Use;
-    use model_core::effects::SENSOR_RESONANCE;
+    use model_core::effects::{LEVEL_RATE, READING_CURVE, SENSOR_RESONANCE, StateDependentDelay};
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
+
+    /// A flow of first order behind a dead time of `delay` samples, which is given the run of y so far.
+    fn carried(seed: u64, delay: impl Fn(&[f64]) -> usize) -> Record {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let mut u = Vec::new();
+        while u.len() < 4000 {
+            let (rest, blow) = (rng.random_range(40..300), rng.random_range(40..300));
+            u.extend(std::iter::repeat_n(0.0, rest));
+            u.extend(std::iter::repeat_n(1.0, blow));
+        }
+        u.truncate(4000);
+        let mut y = vec![0.0];
+        for k in 0..u.len() - 1 {
+            let jet = k.checked_sub(delay(&y)).map_or(0.0, |from| u[from]);
+            y.push(y[k] + (jet - y[k]) / 40.0);
+        }
+        y.iter_mut()
+            .for_each(|y| *y += 0.01 * rng.random_range(-1.0..1.0));
+        let role = match seed % 2 {
+            0 => Use::Identify,
+            _ => Use::Validate,
+        };
+        Record::new(&format!("r{seed}"), role, 0.001, u, y)
+    }
+
+    /// Jets that the flow carries arrive when their way is covered. The delay of eq. (2) follows the mean of eq. (1). No
+    /// curve of the flow stands for the law.
+    #[test]
+    fn a_law_averages_y_over_the_time_in_which_the_flow_carries_the_jets() {
+        let way = |y: &[f64]| {
+            let steps = y.iter().rev().scan(0.0, |way, y| {
+                *way += (1.0 + y) / 60.0;
+                Some(*way)
+            });
+            steps.take_while(|way| *way < 1.0).count()
+        };
+        let mean = |y: &[f64]| {
+            let last = &y[y.len().saturating_sub(249)..];
+            let mean = last.iter().sum::<f64>() / 250.0;
+            (30.0 + 30.0 * (-2.0 * mean).exp()).round() as usize
+        };
+        let window = |delay: &dyn Fn(&[f64]) -> usize| {
+            let records: Vec<Record> = (0..4).map(|seed| carried(seed, delay)).collect();
+            let laws = [
+                Delay::Fixed { delays: vec![50] },
+                Delay::of::<StateDependentDelay<f64>>(&[40.0, 10.0, 4.0], vec![1.0], true),
+            ];
+            let how = Frame {
+                laws: &laws,
+                interpolated: true,
+                settings: Settings::default(),
+            };
+            let found = base_model(&records, &how, &AtomicBool::new(false), &|_| (), &());
+            let model = found.expect("data").expect("stable").model;
+            let is_curved =
+                model.has_effect(READING_CURVE.name) || model.has_effect(LEVEL_RATE.name);
+            (model.averaging.window, is_curved)
+        };
+        assert_eq!(window(&way), (50, false));
+        assert_eq!(window(&mean), (250, false));
+    }
 
     #[test]
     fn a_model_that_diverges_gives_way_to_the_next_one() {

@@ -57,9 +57,6 @@ impl Search<'_> {
                 judged = better;
             }
         }
-        if self.effects {
-            judged = self.averaged(judged);
-        }
         Ok(Hypothesis::new(judged))
     }
 
@@ -70,9 +67,6 @@ impl Search<'_> {
         let mut model = given.clone();
         model.delay_between_samples();
         model.start = root.judged.model().start;
-        if !model.delay.follows_y() {
-            model.averaging = root.judged.model().averaging;
-        }
         let terms = Term::all_of(&model, root.judged.model())?;
         let judged = (!terms.is_empty() && terms.len() <= RULES.most_given)
             .then(|| self.judge.refitted(&model).ok())??;

@@ -89,11 +89,9 @@ impl Term {
         let frame = |model: &Model| {
             let names: Vec<String> = model.effects.iter().map(|e| e.name.clone()).collect();
             let lags = (model.state_lags.clone(), model.product_lags.clone());
-            let averaging = model.averaging;
-            let follows_y = model.delay.follows_y() || averaging.averaged_model;
             (
                 model.convention,
-                follows_y.then_some(averaging),
+                model.averaging,
                 model.b.len(),
                 lags,
                 names,

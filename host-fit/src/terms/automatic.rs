@@ -116,7 +116,7 @@ pub fn base_model(
     let averaged = roots
         .iter()
         .map(|root| root.judged.model())
-        .filter(|model| model.delay.follows_y())
+        .filter(|model| laws.len() > 1 && model.delay.follows_y())
         .flat_map(|model| at_other_averages(&judge, model, std::slice::from_ref(&model.delay)));
     let averaged = averaged.min_by(|a, b| a.size().total_cmp(&b.size()));
     progress("first and second order with dead time");

@@ -5,7 +5,7 @@ use super::bench::Bench;
 use super::evidence::p_value;
 use super::hypothesis::Hypothesis;
 use super::judge::{Judge, Judged};
-use super::laws::at_other_averages;
+use super::laws::at_another_average;
 use super::likely_delay::at_the_likely_delay;
 use super::linear::{self, second_order};
 use super::search::{Found, Search};
@@ -113,12 +113,11 @@ pub fn base_model(
     }
     let by_score = |a: &&Hypothesis, b: &&Hypothesis| a.judged.size().total_cmp(&b.judged.size());
     progress("averaging times of the delay law");
-    let averaged = roots
-        .iter()
-        .map(|root| root.judged.model())
-        .filter(|model| laws.len() > 1 && model.delay.follows_y())
-        .flat_map(|model| at_other_averages(&judge, model, std::slice::from_ref(&model.delay)));
-    let averaged = averaged.min_by(|a, b| a.size().total_cmp(&b.size()));
+    // A law that the user requests keeps the averaging time of eq. (1).
+    let may_average = laws.len() > 1;
+    let of_roots = roots.iter().filter(|_| may_average);
+    let of_roots = of_roots.map(|root| (root.judged.model(), &root.judged.model().delay));
+    let averaged = at_another_average(&judge, of_roots);
     progress("first and second order with dead time");
     let linear = match may_be_constant {
         true => linear::baselines(&given, &judge.learning(0)),
@@ -193,14 +192,11 @@ pub fn base_model(
             found.tried += tried;
         }
     }
-    if laws.len() > 1 && !interrupt.load(Ordering::Relaxed) {
+    if may_average && !interrupt.load(Ordering::Relaxed) {
         progress("averaging times of the delay law");
         let own = found.best.judged.model();
         let lawful = others.iter().chain([&own.delay]);
-        let lawful: Vec<Delay> = lawful.filter(|law| law.follows_y()).cloned().collect();
-        let best = at_other_averages(&judge, own, &lawful)
-            .into_iter()
-            .min_by(|a, b| a.size().total_cmp(&b.size()));
+        let best = at_another_average(&judge, lawful.map(|law| (own, law)));
         // The averaging time is a parameter and must lower the error like every other parameter.
         if let Some(best) = best.filter(|best| best.size() + RULES.price < found.best.judged.size())
         {

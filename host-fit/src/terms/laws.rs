@@ -45,13 +45,18 @@ impl Search<'_> {
     }
 }
 
-/// `model` with these delay laws at the further averaging times, refitted.
-pub(super) fn at_other_averages(judge: &Judge, model: &Model, laws: &[Delay]) -> Vec<Judged> {
-    let all: Vec<Model> = laws
-        .iter()
-        .flat_map(|law| AVERAGES.map(|window| with_average(model, law, window)))
+/// These models and delay laws with the further averaging time that fits best. `None` if no law follows y.
+pub(super) fn at_another_average<'a>(
+    judge: &Judge,
+    lawful: impl Iterator<Item = (&'a Model, &'a Delay)>,
+) -> Option<Judged> {
+    let all: Vec<Model> = lawful
+        .filter(|(_, law)| law.follows_y())
+        .flat_map(|(model, law)| AVERAGES.map(|window| with_average(model, law, window)))
         .collect();
-    parallel::some(&all, |model| judge.refitted(model).ok())
+    let fitted = parallel::some(&all, |model| judge.refitted(model).ok());
+    let by_size = |a: &Judged, b: &Judged| a.size().total_cmp(&b.size());
+    fitted.into_iter().min_by(by_size)
 }
 
 /// The model with a delay law that depends on the mean of y over `window` samples. The levels of the law follow ỹ, which

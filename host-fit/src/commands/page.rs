@@ -671,8 +671,9 @@ fn report_candidates(report: &mut Report, found: &Finding) {
             );
             report.table(
                 "Nats: ln of the Bayes factor of the model with the effect against the model without it. p is \
-                 family-wise: it is corrected for all models that were tried. Each candidate is added alone; the values of \
-                 an effect named beside others are those of the step that adds it to them.",
+                 family-wise: it is corrected for all models that were tried. Each candidate is added alone; \
+                 for effects of the final model, the fall of the error, and beside others nats and p, are those of the step \
+                 that adds them.",
                 &[
                     Column::Text("effect"),
                     Column::Text("outcome"),

@@ -8,6 +8,7 @@ use crate::data::Record;
 use crate::model::{Delay, Model};
 use crate::order;
 use crate::parallel;
+use crate::user_effect::Definition;
 use model_core::effect::{Needs, Place, Spec};
 use model_core::recursion::Grading;
 use std::cmp::Ordering;
@@ -107,8 +108,8 @@ pub fn fit_with_effect(
 }
 
 /// Whether a base model fitted without this effect is a bad starting point for the model with it. Three kinds of
-/// effects are concerned. A sensor that shows only the size of the friction, and a measured input, change the gain,
-/// the delay and the time constant of the base. A pickup can pull the delay of the base to 0, where pickup and
+/// effects are concerned. A sensor that shows only the size of the friction, and a channel that y or its rate follows,
+/// change the gain, the delay and the time constant of the base. A pickup can pull the delay of the base to 0, where pickup and
 /// response are not distinguishable.
 #[must_use]
 pub fn needs_fresh_starts(base: &Model, spec: &Spec) -> bool {
@@ -116,7 +117,9 @@ pub fn needs_fresh_starts(base: &Model, spec: &Spec) -> bool {
     let at_once = spec.needs == Needs::DeadTime && spec.needs.unmet(true, dead_time).is_some();
     at_once
         || spec.parameters.is_empty()
-        || base.measured_inputs().any(|input| input.name == spec.name)
+        || base
+            .definition(spec.name)
+            .is_some_and(Definition::biases_the_base)
 }
 
 /// Several starting points after a few iterations each, best first. Fewer iterations would rank thresholds poorly,

@@ -13,7 +13,7 @@ use crate::picture::{significant, time};
 use crate::residual::NoiseSource;
 use crate::terms::second_lag_s;
 use model_core::effect::Place;
-use model_core::effects::spec;
+use model_core::effects::{NUISANCES, spec};
 
 /// The reliability of p-values and intervals, measured on simulated plants (docs/evidence.md).
 const CALIBRATED: &str = "Reliability of p-values and intervals, measured on simulated plants: of 40 without a \
@@ -89,7 +89,7 @@ fn curves(answer: &mut Answer, diagnosis: &Diagnosis, plant: Plant) {
 /// Why an effect is not named, if a curve explains the records as well.
 fn replaced(effect: &str, curve: &Curve) -> String {
     format!(
-        "{effect} is not named: a curve at the {} that depends on the {} explains the records as well. `discover` fits \
+        "{effect} is not named: a curve at the {} that depends on {} explains the records as well. `discover` fits \
          such curves.",
         curve.place.word(),
         on(&curve.coordinate)
@@ -99,15 +99,16 @@ fn replaced(effect: &str, curve: &Curve) -> String {
 /// A coordinate as a noun.
 fn on(coordinate: &str) -> String {
     match coordinate.strip_prefix("since ") {
-        Some(edge) => format!("time since {edge}"),
-        None => coordinate.to_owned(),
+        Some(edge) => format!("the time since {edge}"),
+        None if coordinate == "y" => coordinate.to_owned(),
+        None => format!("the {coordinate}"),
     }
 }
 
 /// First-order prediction of a term outside the catalogue, in words.
 pub(super) fn beyond(glance: &Glance) -> String {
     format!(
-        "A first estimate beyond the catalogue: a term at the {} that depends on the {} would explain about \
+        "A first estimate beyond the catalogue: a term at the {} that depends on {} would explain about \
          {:.0} % of the unexplained variance.",
         glance.place.word(),
         on(&glance.coordinate),
@@ -168,14 +169,19 @@ fn finding(diagnosis: &Diagnosis, plant: Plant) -> Answer {
     let error = diagnosis.held_out_by.compared().name();
     let now = format!("The {error} is {}.", beside_noise(last, diagnosis));
     let add = |names: &[String]| {
-        let effects = names.iter().map(|name| format!(" --effect {name}"));
-        let effects: String = effects.collect();
-        // Further effects are judged on a base that was identified with the channels.
-        let command = match of_channels(diagnosis).is_empty() || diagnosis.stand_ins.is_empty() {
-            true => "extend model.toml DATASET",
-            false => "identify DATASET",
+        let with = |names: &[String]| -> String {
+            let each = names.iter().map(|name| format!(" --effect {name}"));
+            each.collect()
         };
-        format!("host-fit {command}{effects} -o better.toml")
+        let effects = with(names);
+        // Further effects are judged on a base that was identified with the channels, and with the effects it had.
+        match of_channels(diagnosis).is_empty() || diagnosis.stand_ins.is_empty() {
+            true => format!("host-fit extend model.toml DATASET{effects} -o better.toml"),
+            false => {
+                let had = with(&had_before(&diagnosis.model, names, &diagnosis.stand_ins));
+                format!("host-fit identify DATASET{had}{effects} -o better.toml")
+            }
+        }
     };
     let discover = "host-fit discover model.toml DATASET -o new.toml";
     match diagnosis.verdict {
@@ -388,6 +394,16 @@ fn of_channels(diagnosis: &Diagnosis) -> &[String] {
     &all[..all.iter().take_while(of_a_channel).count()]
 }
 
+/// Effects of `model` that are neither base terms nor among `added` and `stand_ins`.
+fn had_before(model: &Model, added: &[String], stand_ins: &[String]) -> Vec<String> {
+    let is_old = |name: &String| {
+        let is_base_term = NUISANCES.iter().any(|base| base.name == *name);
+        !is_base_term && !added.contains(name) && !stand_ins.contains(name)
+    };
+    let names = model.effects.iter().map(|effect| &effect.name);
+    names.filter(|name| is_old(name)).cloned().collect()
+}
+
 /// Surrogates in addition to named effects.
 fn surrogates(answer: &mut Answer, diagnosis: &Diagnosis, plant: Plant) {
     if diagnosis.verdict != Verdict::EffectMissing || diagnosis.stand_ins.is_empty() {
@@ -573,6 +589,25 @@ mod tests {
         assert!(jet.contains("at the jet that depends on the time since rising edge"));
         let flow = said(crate::curves::Place::Flow, "wind × y");
         assert!(flow.contains("at the flow that depends on the wind × y"));
+    }
+
+    /// A base that has an effect keeps it when it is identified with a channel.
+    #[test]
+    fn effects_of_the_given_model_stay() {
+        let mut records = records(&[], &[], 1);
+        records.truncate(1);
+        let wander = |k: usize| 300.0 + 20.0 * (k as f64 / 90.0).sin();
+        let q = (0..records[0].len()).map(wander).collect();
+        records[0].channels.insert("q".to_owned(), q);
+        let mut model = base(&records).with_inputs(measured_inputs(&records));
+        for name in ["relaxed-by-q", "carried-by-q", "valve-lag", "zero-offset"] {
+            let spec = model.spec(name).expect("known");
+            let start: Vec<f64> = spec.parameters.iter().map(|card| card.starts[0]).collect();
+            model.add(spec, &start, Some(300.0));
+        }
+        let added = ["carried-by-q".to_owned()];
+        let had = had_before(&model, &added, &["valve-lag".to_owned()]);
+        assert_eq!(had, ["relaxed-by-q"]);
     }
 
     #[test]

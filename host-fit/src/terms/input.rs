@@ -1,6 +1,7 @@
 //! A measured channel as a second input of the plant (a second heater, a fan, the ambient temperature), as a factor of
-//! the reading (the dynamic pressure at a balance, the temperature at a hot film) or of the jets (the supply's pressure
-//! or voltage), and as the speed that carries the response to the sensor (the free stream, a belt).
+//! the reading (the dynamic pressure at a balance, the temperature at a hot film), of the jets (the supply's pressure or
+//! voltage) or of the plant's relaxation rate (the wind that cools, the water that leaves a heater), and as the speed that
+//! carries the response to the sensor (the free stream, a belt).
 
 use super::RULES;
 use crate::data::Record;
@@ -9,7 +10,7 @@ use crate::order;
 use crate::parallel;
 use crate::preparation::FirstOrder;
 use crate::residual::correlation;
-use crate::user_effect::{Definition, channel_signal};
+use crate::user_effect::Definition;
 use model_core::effects::SPECS;
 
 /// Channels are ranked with this many samples, averages over all records, to limit the time.
@@ -87,14 +88,19 @@ impl Channel<'_> {
     fn keeps_its_sign(&self) -> bool {
         self.low * self.high > 0.0
     }
+
+    /// Whether no value has the other sign; the light at night is 0.
+    fn has_one_sign(&self) -> bool {
+        self.low * self.high >= 0.0
+    }
 }
 
-/// Up to four effects for each measured channel of `records`. One adds a response to the channel to the reading: a
+/// Up to five effects for each measured channel of `records`. One adds a response to the channel to the reading: a
 /// first-order lag with dead time of the channel's deviation from its first value, as a fraction of its range; at rest
 /// the channel has its first value and the response is 0. Two multiply the reading or the jets by a power of the channel,
-/// if the channel does not change its sign. In the fourth the channel, if positive, is the speed that carries the
-/// response to the sensor. A channel must be in all records, vary, and not be a copy of y, the command or a clock; for
-/// a channel that an effect of the catalogue reads there is only the fourth.
+/// if the channel does not change its sign. In the fourth the relaxation rate grows with the channel. In the fifth the
+/// channel, if positive, is the speed that carries the response to the sensor. A channel must be in all records, vary, and
+/// not be a copy of y, the command or a clock; for a channel that an effect of the catalogue reads there is only the fifth.
 #[must_use]
 pub(crate) fn measured_inputs(records: &[Record]) -> Vec<&'static Definition> {
     effects_of(channels_that_vary(records).iter())
@@ -108,6 +114,7 @@ fn effects_of<'a>(channels: impl Iterator<Item = &'a Channel<'a>>) -> Vec<&'stat
                 measured_input(channel),
                 scaled_by(channel),
                 driven_by(channel),
+                relaxed_by(channel),
             ]
         };
         let new = (!read(channel)).then(new).into_iter().flatten();
@@ -174,15 +181,10 @@ scales = true
     Definition::from_toml(&text, channel.name).ok()
 }
 
-/// The lines of an expression in which `numerator / denominator` is the relative change of (v/v_mean)^gain with the channel: its Padé
-/// approximant, which is exact for the powers −1, 0 and 1.
-fn power(channel: &Channel<'_>) -> String {
-    let signal = channel_signal(channel.name);
-    format!(
-        "let numerator = gain * ({signal} / reference - 1.0);
-let denominator = max(1.0 + 0.5 * (1.0 - gain) * ({signal} / reference - 1.0), 0.1);"
-    )
-}
+/// The lines of an expression in which `numerator / denominator` is the relative change of (v/v_mean)^gain with the
+/// channel v: its Padé approximant, which is exact for the powers −1, 0 and 1.
+const POWER: &str = "let numerator = gain * (channel / reference - 1.0);
+let denominator = max(1.0 + 0.5 * (1.0 - gain) * (channel / reference - 1.0), 0.1);";
 
 /// The range of that power.
 const POWERS: &str = r#"[[parameter]]
@@ -200,7 +202,7 @@ fn scaled_by(channel: &Channel<'_>) -> Option<&'static Definition> {
     }
     let body = format!(
         r#"expression = """
-{}
+{POWER}
 reading + numerator / denominator * (reading - zero)"""
 {POWERS}[[parameter]]
 name = "zero"
@@ -208,8 +210,7 @@ unit = "reading"
 low = -100.0
 high = 100.0
 starts = [0.0, -2.0]
-"#,
-        power(channel)
+"#
     );
     let texts = [
         "the reading scales with",
@@ -225,16 +226,44 @@ fn driven_by(channel: &Channel<'_>) -> Option<&'static Definition> {
     }
     let body = format!(
         r#"expression = """
-{}
+{POWER}
 jet + numerator / denominator * jet"""
-{POWERS}"#,
-        power(channel)
+{POWERS}"#
     );
     let texts = [
         "the response to the command scales with",
         "the supply of the jets: their strength is a power of its pressure or voltage",
     ];
     of_channel(["driven-by", "jet"], channel, texts, &body)
+}
+
+/// A relaxation rate that grows with the channel: the flow returns faster to the level `pull / gain`.
+///
+/// Both parameters are factors of the channel: with the level itself instead of `pull`, a fit may end at a gain of 0 with
+/// an infinite level.
+fn relaxed_by(channel: &Channel<'_>) -> Option<&'static Definition> {
+    if !channel.has_one_sign() {
+        return None;
+    }
+    let body = r#"expression = "relaxation * (channel / reference - 1.0) * (pull - gain * y)"
+[[parameter]]
+name = "gain"
+unit = "-"
+low = -10.0
+high = 10.0
+starts = [1.0, -0.5]
+[[parameter]]
+name = "pull"
+unit = "y"
+low = -10.0
+high = 10.0
+starts = [0.0, -0.3]
+"#;
+    let texts = [
+        "the relaxation rate grows with",
+        "balance: a loss in proportion to the channel, as of a tank to its outflow",
+    ];
+    of_channel(["relaxed-by", "flow"], channel, texts, body)
 }
 
 /// The state that is 0 at the first sample of a record.
@@ -253,7 +282,6 @@ fn carried_by(channel: &Channel<'_>) -> Option<&'static Definition> {
     if low <= 0.0 {
         return None;
     }
-    let signal = channel_signal(channel.name);
     let slowest = low.max(high / MOST_SLOWER);
     let longest = high / slowest;
     let body = format!(
@@ -263,8 +291,8 @@ expression = "delayed(jet, transit * reference / max(mean_speed, {slowest:?}), t
 name = "mean_speed"
 update = """
 if has_begun > 0.5 {{
-    mean_speed + (1.0 - exp(-2.0 * period * mean_speed / (transit * reference))) * ({signal} - mean_speed)
-}} else {{ {signal} }}"""
+    mean_speed + (1.0 - exp(-2.0 * period * mean_speed / (transit * reference))) * (channel - mean_speed)
+}} else {{ channel }}"""
 {HAS_BEGUN}[[parameter]]
 name = "transit"
 unit = "s"
@@ -282,17 +310,16 @@ starts = [0.01, 0.03, 0.06, 0.1]
 
 /// The response to the channel.
 fn measured_input(channel: &Channel<'_>) -> Option<&'static Definition> {
-    let signal = channel_signal(channel.name);
     let range = channel.high - channel.low;
     let body = format!(
         r#"expression = "reading + gain * lagged"
 [[state]]
 name = "first_value"
-update = "if has_begun > 0.5 {{ first_value }} else {{ {signal} }}"
+update = "if has_begun > 0.5 {{ first_value }} else {{ channel }}"
 [[state]]
 name = "lagged"
 update = """
-lagged + (1.0 - exp(-period / lag)) * (delayed(({signal} - first_value) / {range:?}, dead_time) - lagged)"""
+lagged + (1.0 - exp(-period / lag)) * (delayed((channel - first_value) / {range:?}, dead_time) - lagged)"""
 {HAS_BEGUN}[[parameter]]
 name = "gain"
 unit = "y"
@@ -356,11 +383,12 @@ mod tests {
             "input-heater-2",
             "scaled-by-heater-2",
             "driven-by-heater-2",
+            "relaxed-by-heater-2",
             "carried-by-heater-2",
         ];
         // The catalogue has an effect of the free stream on the strength of the jets.
-        assert_eq!(names[..4], of_heater);
-        assert_eq!(names[4..], ["carried-by-u-inf"]);
+        assert_eq!(names[..5], of_heater);
+        assert_eq!(names[5..], ["carried-by-u-inf"]);
         // The channels are the reading in another unit, a copy of the command, and a clock.
         for record in &mut records {
             record.u = (0..900)
@@ -378,8 +406,8 @@ mod tests {
             .iter()
             .map(|i| i.spec().name)
             .collect();
-        assert_eq!(names[..4], of_heater);
-        assert_eq!(names.len(), 5);
+        assert_eq!(names[..5], of_heater);
+        assert_eq!(names.len(), 6);
         // One record lacks the channel.
         assert!(measured_inputs(&[records[0].clone(), record(&[])]).is_empty());
     }
@@ -396,9 +424,13 @@ mod tests {
             "t",
             "reference",
             "U inf",
+            "gain",
+            "lag",
+            "transit",
+            "channel",
         ] {
             let names = measured_inputs(&[record(&[name])]).len();
-            assert_eq!(names, 4, "{name}");
+            assert_eq!(names, 5, "{name}");
         }
     }
 
@@ -422,8 +454,8 @@ mod tests {
             .iter()
             .map(|i| i.spec().name)
             .collect();
-        // The other channels begin at 0, so that nothing scales with them.
-        assert_eq!((names.len(), names[0]), (RULES.inputs, "input-c7"));
+        // The other channels begin at 0, so that neither reading nor jets scale with them.
+        assert_eq!((names.len(), names[0]), (2 * RULES.inputs, "input-c7"));
     }
 
     /// The square of the channel, of all that is above 1; the offset of 3 is part of the reading.
@@ -495,6 +527,22 @@ mod tests {
                 .expect("it does not diverge");
             let expected = (5.0_f64 / 4.5).powf(gain);
             assert!((y[800] - expected).abs() < 0.001, "{gain}: {}", y[800]);
+        }
+    }
+
+    /// Water that leaves a heater takes its warmth along.
+    #[test]
+    fn the_relaxation_rate_is_the_channels() {
+        let mut record = record(&["q"]);
+        record.u = vec![1.0; 900];
+        let relaxed = relaxed_by(&SPEED).expect("of one sign");
+        let mut model = jets(relaxed, &[1.0, 0.0], 4.0);
+        (model.a[0], model.b[0]) = (0.98, 0.02);
+        let y = model.free_run(&record).expect("it does not diverge");
+        let mut s = 0.0;
+        for (y, q) in y.iter().zip(&record.channels["q"]) {
+            assert!((y - s).abs() < 1e-9, "{y} {s}");
+            s += 0.02 * (1.0 - s * q / 4.0);
         }
     }
 

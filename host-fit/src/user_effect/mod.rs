@@ -21,7 +21,7 @@ pub use rust::{module_name, type_name};
 use model_core::effect::{Place, Spec};
 use program::Program;
 use source::Refusal;
-pub(crate) use source::{Source, channel_signal};
+pub(crate) use source::Source;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 use thiserror::Error;
@@ -182,6 +182,12 @@ impl Definition {
     /// Whether the effect is a measured input: a channel with a response of its own.
     pub(crate) fn is_measured_input(&self) -> bool {
         self.is_of_a_channel() && self.spec.place == Place::Sensor && self.source.has_states()
+    }
+
+    /// Whether a base without the effect has another gain, dead time and time constant: a measured input, or a
+    /// relaxation rate that a channel changes.
+    pub(crate) fn biases_the_base(&self) -> bool {
+        self.is_measured_input() || self.is_of_a_channel() && self.spec.place == Place::Flow
     }
 
     /// Operations of the effect at a sample.

@@ -76,12 +76,12 @@ fn is_identifier(name: &str) -> bool {
         && syn::parse_str::<syn::Ident>(name).is_ok()
 }
 
+/// The channel in expressions, whatever its own name is.
+const CHANNEL: &str = "channel";
 /// The mean of the channel, in expressions.
 const REFERENCE: &str = "reference";
 
 impl SourcePlace {
-    const ALL: [Self; 3] = [Self::Jet, Self::Flow, Self::Sensor];
-
     /// The names of the signals in expressions of this place.
     fn signals(self) -> Vec<(&'static str, Op)> {
         let mut signals = vec![
@@ -103,17 +103,6 @@ impl SourcePlace {
             ]),
         }
         signals
-    }
-}
-
-/// The name of a channel in expressions: its own, or `channel` if that is no free name of the language.
-pub(crate) fn channel_signal(channel: &str) -> &str {
-    let mut signals = SourcePlace::ALL.into_iter().flat_map(SourcePlace::signals);
-    let is_taken = channel == REFERENCE || signals.any(|(name, _)| name == channel);
-    if is_identifier(channel) && !is_taken {
-        channel
-    } else {
-        "channel"
     }
 }
 
@@ -144,6 +133,14 @@ impl Source {
         }
     }
 
+    /// Whether a parameter or a state has this name.
+    fn defines(&self, name: &str) -> bool {
+        self.parameter
+            .iter()
+            .any(|parameter| parameter.name == name)
+            || self.state.iter().any(|state| state.name == name)
+    }
+
     pub(super) fn compile(&self) -> Result<Program, Refusal> {
         let key = |key: &str, problem: String| Err(Refusal::Key(key.to_owned(), problem));
         if !is_effect_name(&self.name) {
@@ -164,11 +161,16 @@ impl Source {
             return key("summary", "describe the effect in one line".to_owned());
         }
         let mut compiler = Compiler::default();
-        let mut signals = self.place.signals();
+        let mut signals: Vec<(&str, Op)> = self.place.signals();
+        let knows =
+            |signals: &[(&str, Op)], name: &str| signals.iter().any(|(known, _)| *known == name);
         if let Some(channel) = &self.channel {
-            let name = channel_signal(channel);
-            signals.push((name, Op::Signal(Signal::Channel)));
+            signals.push((CHANNEL, Op::Signal(Signal::Channel)));
             signals.push((REFERENCE, Op::Reference));
+            // Its own name, if that is free.
+            if is_identifier(channel) && !self.defines(channel) && !knows(&signals, channel) {
+                signals.push((channel, Op::Signal(Signal::Channel)));
+            }
         }
         let mut name = |label: String, name: &str, op: Op| {
             if !is_identifier(name) {

@@ -258,30 +258,23 @@ fn candidate_row(r: &Ranked, diagnosis: &Diagnosis, plant: Plant) -> Vec<String>
         .collect();
     // What an effect adds to the others is a matter of the model with all of them.
     let beside = diagnosis.certificates.get(&r.effect);
-    let (falls, nats, p_value) = match beside.filter(|_| is_named_beside(r, diagnosis)) {
-        Some(own) => (
-            falls_at_its_step(r, diagnosis),
-            Some(own.evidence_nats),
-            Some(own.p_value()),
-        ),
-        None => (
-            r.error_reduction_percent,
-            r.gain_nats,
-            r.refitted.then_some(r.p_value),
-        ),
+    let (nats, p_value) = match beside.filter(|_| is_named_beside(r, diagnosis)) {
+        Some(own) => (Some(own.evidence_nats), Some(own.p_value())),
+        None => (r.gain_nats, r.refitted.then_some(r.p_value)),
     };
     let none = || "–".to_owned();
     vec![
         effect_in_words(&r.effect, plant),
         outcome(r, diagnosis, plant),
-        percent(falls),
+        percent(falls_at_its_step(r, diagnosis)),
         nats.map_or_else(none, |nats| whole(nats.round())),
         p_value.map_or_else(none, p_bound),
         parameters.join(", "),
     ]
 }
 
-/// By how much the error falls at the step of the ladder that adds the effect, %.
+/// By how much the error falls at the step of the ladder that adds the effect, %; for an effect without a step, when it is
+/// added alone.
 fn falls_at_its_step(r: &Ranked, diagnosis: &Diagnosis) -> f64 {
     let steps = diagnosis.ladder.windows(2);
     let mut own = steps.filter(|pair| pair[1].effects.last() == Some(&r.effect));

@@ -217,7 +217,10 @@ fn read(text: &str, place: &str) -> Result<Source, DefinitionError> {
 
 /// The program of an effect; `prefix` is put before the keys in errors.
 fn compiled(source: &Source, place: &str, prefix: &str) -> Result<Program, DefinitionError> {
-    source.compile().map_err(|refusal| match refusal {
+    let program = source.compile();
+    // Otherwise the text of every parsed expression is kept until the thread ends. No token outlives the compilation.
+    proc_macro2::extra::invalidate_current_thread_spans();
+    program.map_err(|refusal| match refusal {
         Refusal::Key(key, problem) => DefinitionError::Key {
             place: place.to_owned(),
             key: format!("{prefix}{key}"),

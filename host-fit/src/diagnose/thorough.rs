@@ -2,7 +2,7 @@
 
 use super::RULES;
 use crate::model::{Model, Start};
-use crate::terms::{Effort, Found, Hypothesis, Search};
+use crate::terms::{Effort, Found, Hypothesis, Search, at_the_papers_average};
 
 /// The given model, and how further starts are made of it.
 pub(crate) struct Given<'a, E> {
@@ -24,12 +24,38 @@ impl Search<'_> {
     }
 
     /// The best model from `root`, from the structure of the given model, and with another delay law; and the root
-    /// from which it was found.
+    /// from which it was found. If the given model misses the noise level, its averaging time was chosen without the
+    /// effects, and that of eq. (1) is tried first.
     pub(crate) fn thorough<E>(
         &self,
         root: Hypothesis,
         given: &Given<'_, E>,
     ) -> (Found, Hypothesis) {
+        let misses = |rmse: f64| self.judge.over_noise(rmse) > RULES.floor_margin;
+        let papers = at_the_papers_average(given.model).filter(|_| misses(given.rmse));
+        let other = papers.and_then(|model| Some(((given.root)(&model).ok()?, model)));
+        let Some((other, model)) = other else {
+            return self.at_one_average(root, given);
+        };
+        let first = self.at_one_average(
+            other,
+            &Given {
+                model: &model,
+                ..*given
+            },
+        );
+        if !misses(first.0.best.judged.rmse()) {
+            return first;
+        }
+        let second = self.at_one_average(root, given);
+        match second.0.best.score() < first.0.best.score() {
+            true => second,
+            false => first,
+        }
+    }
+
+    /// [`thorough`](Self::thorough) with the averaging time of the given model.
+    fn at_one_average<E>(&self, root: Hypothesis, given: &Given<'_, E>) -> (Found, Hypothesis) {
         let judge = self.judge;
         let (model, below) = (given.model, 1.0 - RULES.worthwhile);
         let mut origin = root.clone();

@@ -7,11 +7,12 @@ use super::term::take_delay_law;
 use crate::fit::rows;
 use crate::model::{Delay, Model};
 use crate::parallel;
+use model_core::average::WINDOW;
 use model_core::effect::Place;
 
-/// Averaging times of y that are tried with a delay law in addition to that of eq. (1), samples. A flow that
-/// carries the jets with its present velocity averages over the dead time.
-const AVERAGES: [u32; 3] = [2, 50, 125];
+/// Averaging times of y that are tried with a delay law, samples. The last is that of eq. (1). A flow that carries the jets
+/// with its present velocity averages over the dead time.
+const AVERAGES: [u32; 4] = [2, 50, 125, WINDOW];
 
 impl Search<'_> {
     /// The structure with the best-fitting delay law of the catalogue, those in `forgotten` excluded. `None` if the
@@ -45,18 +46,29 @@ impl Search<'_> {
     }
 }
 
-/// These models and delay laws with the further averaging time that fits best. `None` if no law follows y.
+/// These models and delay laws with the other averaging time that fits best. `None` if no law follows y.
 pub(super) fn at_another_average<'a>(
     judge: &Judge,
     lawful: impl Iterator<Item = (&'a Model, &'a Delay)>,
 ) -> Option<Judged> {
     let all: Vec<Model> = lawful
         .filter(|(_, law)| law.follows_y())
-        .flat_map(|(model, law)| AVERAGES.map(|window| with_average(model, law, window)))
+        .flat_map(|(model, law)| {
+            let others = AVERAGES
+                .into_iter()
+                .filter(|window| *window != model.averaging.window);
+            others.map(|window| with_average(model, law, window))
+        })
         .collect();
     let fitted = parallel::some(&all, |model| judge.refitted(model).ok());
     let by_size = |a: &Judged, b: &Judged| a.size().total_cmp(&b.size());
     fitted.into_iter().min_by(by_size)
+}
+
+/// `model` with the averaging time of eq. (1); `None` if it has that one, or if its delay does not follow y.
+pub(crate) fn at_the_papers_average(model: &Model) -> Option<Model> {
+    let other = model.delay.follows_y() && model.averaging.window != WINDOW;
+    other.then(|| with_average(model, &model.delay, WINDOW))
 }
 
 /// The model with a delay law that depends on the mean of y over `window` samples. The levels of the law follow ỹ, which

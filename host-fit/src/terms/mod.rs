@@ -47,6 +47,7 @@ pub use hypothesis::Hypothesis;
 pub(crate) use input::{leading_inputs, measured_inputs};
 pub(crate) use judge::size;
 pub use judge::{Judge, Judged};
+pub(crate) use laws::at_the_papers_average;
 pub(crate) use likelihood::Likelihood;
 pub(crate) use linear::{baselines, second_order};
 pub use proposal::Proposal;

@@ -414,19 +414,14 @@ fn decided(order: &[&'static Spec], model: &Model) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::residual::plants::{base, drift, records};
-    use crate::terms::{Bench, measured_inputs};
+    use crate::residual::plants::{base, base_with_channel, drift, records};
+    use crate::terms::Bench;
     use model_core::effects::spec;
     use std::sync::atomic::AtomicBool;
 
     #[test]
     fn what_follows_a_measured_channel_is_decided_later() {
-        let mut records = records(&[], &[], 1);
-        records.truncate(1);
-        let wander = |k: usize| 300.0 + 20.0 * (k as f64 / 90.0).sin();
-        let q = (0..records[0].len()).map(wander).collect();
-        records[0].channels.insert("q".to_owned(), q);
-        let model = base(&records).with_inputs(measured_inputs(&records));
+        let model = base_with_channel("q");
         let known = |name: &str| model.spec(name).expect("known");
         let [lag, drift] = ["valve-lag", "thermal-drift"].map(known);
         let [input, scaled] = ["input-q", "scaled-by-q"].map(known);

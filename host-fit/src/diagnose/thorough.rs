@@ -110,3 +110,25 @@ impl Search<'_> {
         (found, origin)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::diagnose::{Options, diagnose};
+    use crate::residual::plants::{base, drift, records};
+    use model_core::average::WINDOW;
+    use std::sync::atomic::AtomicBool;
+
+    /// The plant's delay follows the mean of eq. (1). Its base was identified with another one, beside a drift.
+    #[test]
+    fn an_averaging_time_that_was_chosen_without_the_effect_is_not_kept() {
+        let mut records = records(&[], &[], 3);
+        drift(&mut records, &[(0.15, 1.5)]);
+        let mut given = base(&records);
+        given.averaging.window = 50;
+        let never = AtomicBool::new(false);
+        let found = diagnose(&given, &records, &Options::default(), &never, &|_| ());
+        let found = found.expect("records to learn from");
+        assert_eq!(found.missing, ["thermal-drift"]);
+        assert_eq!(found.model.averaging.window, WINDOW);
+    }
+}

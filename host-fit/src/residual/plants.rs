@@ -4,6 +4,7 @@ use super::{FailureCoordinate, Failures, where_it_fails};
 use crate::data::{Record, Use};
 use crate::fit::lean_base;
 use crate::model::{Delay, Model};
+use crate::terms::measured_inputs;
 use firmware_sim::hidden_set::HiddenSetPlan;
 use model_core::effects::StateDependentDelay;
 
@@ -26,6 +27,16 @@ pub(crate) fn drift(records: &mut [Record], parts: &[(f64, f64)]) {
                 .sum::<f64>();
         }
     }
+}
+
+/// A base model with the effects of a measured channel of this name, which varies.
+pub(crate) fn base_with_channel(name: &str) -> Model {
+    let mut records = records(&[], &[], 1);
+    records.truncate(1);
+    let wander = |k: usize| 300.0 + 20.0 * (k as f64 / 90.0).sin();
+    let values = (0..records[0].len()).map(wander).collect();
+    records[0].channels.insert(name.to_owned(), values);
+    base(&records).with_inputs(measured_inputs(&records))
 }
 
 /// The lowest-order bilinear model with a state-dependent delay, identified on the records.

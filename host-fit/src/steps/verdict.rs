@@ -549,8 +549,7 @@ fn bench_check(sets: &[Vec<String>]) -> &'static str {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::residual::plants::{base, records};
-    use crate::terms::measured_inputs;
+    use crate::residual::plants::base_with_channel;
 
     #[test]
     fn a_bound_on_p_is_said_with_its_sign() {
@@ -561,12 +560,7 @@ mod tests {
     /// A sensitivity that a channel changes is no input.
     #[test]
     fn a_measured_input_is_called_by_its_channel() {
-        let mut records = records(&[], &[], 1);
-        records.truncate(1);
-        let wander = |k: usize| 300.0 + 20.0 * (k as f64 / 90.0).sin();
-        let fan = (0..records[0].len()).map(wander).collect();
-        records[0].channels.insert("Fan 2".to_owned(), fan);
-        let model = base(&records).with_inputs(measured_inputs(&records));
+        let model = base_with_channel("Fan 2");
         let names = ["input-fan-2", "scaled-by-fan-2", "valve-lag"].map(str::to_owned);
         assert!(names.iter().all(|name| model.spec(name).is_some()));
         assert_eq!(
@@ -594,12 +588,7 @@ mod tests {
     /// A base that has an effect keeps it when it is identified with a channel.
     #[test]
     fn effects_of_the_given_model_stay() {
-        let mut records = records(&[], &[], 1);
-        records.truncate(1);
-        let wander = |k: usize| 300.0 + 20.0 * (k as f64 / 90.0).sin();
-        let q = (0..records[0].len()).map(wander).collect();
-        records[0].channels.insert("q".to_owned(), q);
-        let mut model = base(&records).with_inputs(measured_inputs(&records));
+        let mut model = base_with_channel("q");
         for name in ["relaxed-by-q", "carried-by-q", "valve-lag", "zero-offset"] {
             let spec = model.spec(name).expect("known");
             let start: Vec<f64> = spec.parameters.iter().map(|card| card.starts[0]).collect();

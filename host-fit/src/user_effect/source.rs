@@ -162,13 +162,12 @@ impl Source {
         }
         let mut compiler = Compiler::default();
         let mut signals: Vec<(&str, Op)> = self.place.signals();
-        let knows =
-            |signals: &[(&str, Op)], name: &str| signals.iter().any(|(known, _)| *known == name);
         if let Some(channel) = &self.channel {
             signals.push((CHANNEL, Op::Signal(Signal::Channel)));
             signals.push((REFERENCE, Op::Reference));
             // Its own name, if that is free.
-            if is_identifier(channel) && !self.defines(channel) && !knows(&signals, channel) {
+            let is_signal = signals.iter().any(|(known, _)| known == channel);
+            if is_identifier(channel) && !is_signal && !self.defines(channel) {
                 signals.push((channel, Op::Signal(Signal::Channel)));
             }
         }

@@ -34,20 +34,19 @@ impl Search<'_> {
         let misses = |rmse: f64| self.judge.over_noise(rmse) > RULES.floor_margin;
         let papers = at_the_papers_average(given.model).filter(|_| misses(given.rmse));
         let other = papers.and_then(|model| Some(((given.root)(&model).ok()?, model)));
+        let mut effort = Effort::of_a_search();
         let Some((other, model)) = other else {
-            return self.at_one_average(root, given);
+            return self.at_one_average(root, given, &mut effort);
         };
-        let first = self.at_one_average(
-            other,
-            &Given {
-                model: &model,
-                ..*given
-            },
-        );
-        if !misses(first.0.best.judged.rmse()) {
+        let with_papers = Given {
+            model: &model,
+            ..*given
+        };
+        let first = self.at_one_average(other, &with_papers, &mut effort);
+        if !misses(first.0.best.judged.rmse()) || effort.is_spent() {
             return first;
         }
-        let second = self.at_one_average(root, given);
+        let second = self.at_one_average(root, given, &mut effort);
         match second.0.best.score() < first.0.best.score() {
             true => second,
             false => first,
@@ -55,16 +54,16 @@ impl Search<'_> {
     }
 
     /// [`thorough`](Self::thorough) with the averaging time of the given model.
-    fn at_one_average<E>(&self, root: Hypothesis, given: &Given<'_, E>) -> (Found, Hypothesis) {
+    fn at_one_average<E>(
+        &self,
+        root: Hypothesis,
+        given: &Given<'_, E>,
+        effort: &mut Effort,
+    ) -> (Found, Hypothesis) {
         let judge = self.judge;
         let (model, below) = (given.model, 1.0 - RULES.worthwhile);
         let mut origin = root.clone();
-        let mut effort = Effort::of_a_search();
-        let mut found = self.run_within(
-            root,
-            Some(&|| self.second_roots(model, &origin)),
-            &mut effort,
-        );
+        let mut found = self.run_within(root, Some(&|| self.second_roots(model, &origin)), effort);
         let reached = found.best.judged.rmse();
         let misses = |rmse: f64| judge.over_noise(rmse) > RULES.floor_margin;
         // The given structure may contain terms that the search cannot reach by single steps.
@@ -75,7 +74,7 @@ impl Search<'_> {
             && let Ok(judged) = judge.refitted(model)
             && judged.rmse() < origin.judged.rmse()
         {
-            let from_given = self.run_within(Hypothesis::of_given(judged), None, &mut effort);
+            let from_given = self.run_within(Hypothesis::of_given(judged), None, effort);
             if from_given.best.judged.rmse() < below * reached {
                 found = from_given;
             }
@@ -99,7 +98,7 @@ impl Search<'_> {
                 let anew = self.run_within(
                     root,
                     Some(&|| self.second_roots(&with_law, &set_out)),
-                    &mut effort,
+                    effort,
                 );
                 if anew.best.score() < found.best.score() {
                     (found, origin) = (anew, set_out);

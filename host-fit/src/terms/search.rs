@@ -644,7 +644,7 @@ mod tests {
     /// Lags that were chosen first imitate the echo. Beside them the echo lowers the error less than alone.
     #[test]
     fn an_effect_is_also_tried_without_the_lags_that_were_chosen_before_it() {
-        let records = records(&["echo-path"], &[], 3);
+        let records = records(&["echo-path"], &[], 1);
         let bench = Bench::of(&base(&records), &records).expect("records to learn from");
         let never = AtomicBool::new(false);
         let search = Search::silent(&bench.judge, 1, &never);

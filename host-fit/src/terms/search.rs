@@ -675,5 +675,20 @@ mod tests {
         // The same effects are not fitted again.
         search.purge(&mut all, &mut purged, &mut effort);
         assert_eq!(all.len(), 3);
+
+        // A given model with less than half of the error does not end the search for effects from the fewest lags; the
+        // other way round it does.
+        let from = |from_given: bool, of: &Hypothesis| Hypothesis {
+            from_given,
+            expanded: false,
+            ..of.clone()
+        };
+        let (root, better) = (&all[0], &all[2]);
+        assert!(better.judged.rmse() < root.judged.rmse() / RULES.rival);
+        let is_followed = |given_leads: bool| {
+            let both = [from(!given_leads, root), from(given_leads, better)];
+            search.chosen(&both, None).contains(&(0, true))
+        };
+        assert!(is_followed(true) && !is_followed(false));
     }
 }

@@ -60,13 +60,11 @@ impl Search<'_> {
     /// Replaces base terms of the best hypothesis by an effect if that lowers the score, and by further effects while the
     /// error is above the noise level.
     fn with_effects_instead(&self, found: &mut Found) {
-        let mut enough = RULES.at_the_floor;
-        while (found.best.is_bare() || self.over(&found.best) > enough)
+        while (found.best.is_bare() || self.over(&found.best) > RULES.near_the_floor)
             && let Some(better) = self.with_an_effect_instead(found)
         {
             found.all.push(better.clone());
             found.best = better;
-            enough = RULES.near_the_floor;
         }
     }
 

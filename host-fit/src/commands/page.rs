@@ -6,7 +6,7 @@ use host_fit::discover::{FoundTerm, TRACED, Trace};
 use host_fit::indicators::{ErrorKind, Indicators, Scores, score};
 use host_fit::model::Model;
 use host_fit::picture::{
-    BandPoint, Column, CurvePlot, Living, Picture, Report, Stretches, WhereItFails, curve,
+    BandPoint, Column, CurvePlot, Living, Picture, Report, Stretches, WhereItFails, curve, listed,
 };
 use host_fit::residual::Failures;
 use host_fit::steps::{
@@ -142,7 +142,7 @@ pub(crate) fn extension(
         .collect();
     let changed = found.before.as_ref().zip(found.after.as_ref());
     let picture = changed.map(|(before, after)| {
-        let with = format!("with {}", found.effects.join(" and "));
+        let with = format!("with {}", listed(&found.effects));
         let bars = [
             ("the model as given", before.rmse),
             (with.as_str(), after.rmse),

@@ -2,6 +2,7 @@
 
 use super::{Experiment, Limits, RULES, separating};
 use crate::model::Model;
+use crate::picture::listed;
 use serde::{Serialize, Serializer};
 
 /// A discriminating experiment. Serialises to `experiment` of `diagnose --json` and `discover --json`.
@@ -41,7 +42,7 @@ impl Separation {
     pub fn words(&self) -> String {
         format!(
             "Experiment that distinguishes {}: {} (`--experiment command.csv` writes it).",
-            self.effects.join(" and "),
+            listed(&self.effects),
             self.experiment.words().trim_end_matches('.')
         )
     }

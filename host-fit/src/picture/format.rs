@@ -147,6 +147,17 @@ fn allowed(c: char) -> bool {
     matches!(c, '\t' | '\n' | '\r' | '\u{20}'..='\u{d7ff}' | '\u{e000}'..='\u{fffd}' | '\u{10000}'..)
 }
 
+/// A list in words: "a", "a and b", "a, b and c".
+#[must_use]
+pub fn listed<T: AsRef<str>>(items: &[T]) -> String {
+    let items: Vec<&str> = items.iter().map(AsRef::as_ref).collect();
+    match items.as_slice() {
+        [] => String::new(),
+        [one] => (*one).to_owned(),
+        [before @ .., last] => format!("{} and {last}", before.join(", ")),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -167,5 +178,18 @@ mod tests {
         assert_eq!(fixed(-0.0004, 2, false), "0.00");
         assert_eq!(fixed(-1.5, 2, true), "−1.5");
         assert_eq!(fixed(-1.5, 2, false), "−1.50");
+    }
+
+    #[test]
+    fn lists_have_commas_before_the_last_item() {
+        let cases: [(&[&str], &str); 4] = [
+            (&[], ""),
+            (&["a"], "a"),
+            (&["a", "b"], "a and b"),
+            (&["a", "b", "c"], "a, b and c"),
+        ];
+        for (items, expected) in cases {
+            assert_eq!(listed(items), expected);
+        }
     }
 }

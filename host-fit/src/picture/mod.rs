@@ -33,7 +33,7 @@ pub use canvas::Picture;
 pub use closed_loop::{ClosedLoop, LoopRun, closed_loop};
 pub use curve::{BandPoint, CurvePlot, curve};
 pub use delay_law::{DelayEdge, DelayLawPlot, LawPoint, MeasuredDelay, delay_law};
-pub use format::{fixed, readable_time, signed, significant, time};
+pub use format::{fixed, listed, readable_time, signed, significant, time};
 pub use frequency::{
     DEPTH as MAGNITUDE_DEPTH_DB, FrequencyCurve, FrequencyPlot, MeasuredResponse,
     TURN as PHASE_DEPTH_DEG, frequency,

@@ -14,7 +14,7 @@ use crate::excitation::says_little;
 use crate::experiment::Separation;
 use crate::indicators::{Scores, score};
 use crate::model::{Model, Training};
-use crate::picture::{significant, time};
+use crate::picture::{listed, significant, time};
 use crate::residual::NoiseSource;
 use crate::terms::HeldOutBy;
 use serde::{Serialize, Serializer};
@@ -275,7 +275,7 @@ fn headline(terms: &[FoundTerm]) -> String {
                 .to_owned();
         }
         [one] => format!("a term is missing {one}"),
-        several => format!("terms are missing {}", several.join(" and ")),
+        several => format!("terms are missing {}", listed(several)),
     };
     match each.len() == terms.len() {
         true => named,

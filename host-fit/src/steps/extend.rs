@@ -14,7 +14,7 @@ use crate::diagnose::ParameterEstimate;
 use crate::extend::{Extended, extend as refit};
 use crate::indicators::{Indicators, Scores, score, score_new};
 use crate::model::Model;
-use crate::picture::significant;
+use crate::picture::{listed, significant};
 use crate::residual::where_it_fails;
 use crate::terms::measured_inputs;
 
@@ -90,7 +90,7 @@ fn refuse_worse(
         return Ok(());
     }
     Err(StepError::NoGain {
-        effects: effects.join(" and "),
+        effects: listed(effects),
         before: significant(before.rmse, 5),
         after: match after.rmse.is_finite() {
             true => significant(after.rmse, 5),
@@ -163,7 +163,7 @@ pub fn extend(
     let changes = scores_after.records.iter().enumerate();
     Ok(Extension {
         answer: level::extended(
-            &effects.join(" and "),
+            &listed(effects),
             finished,
             scores_before.as_ref().and_then(Scores::held_out),
             scores_after.held_out(),

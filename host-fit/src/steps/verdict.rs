@@ -9,9 +9,9 @@ use crate::diagnose::{
 };
 use crate::discover::Glance;
 use crate::model::Model;
-use crate::picture::{significant, time};
+use crate::picture::{listed, significant, time};
 use crate::residual::NoiseSource;
-use crate::terms::second_lag_s;
+use crate::terms::{RULES as TERMS, second_lag_s};
 use model_core::effect::Place;
 use model_core::effects::{NUISANCES, spec};
 
@@ -152,10 +152,6 @@ pub(super) fn times(ratio: f64) -> String {
     }
 }
 
-fn joined(names: &[String]) -> String {
-    names.join(" and ")
-}
-
 /// The effects in the words for this kind of plant.
 fn named(names: &[String], plant: Plant) -> Vec<String> {
     let each = names.iter();
@@ -197,7 +193,7 @@ fn finding(diagnosis: &Diagnosis, plant: Plant) -> Answer {
                 .evidence(match plant {
                     Plant::Flow => format!(
                         "{} The records show {}.",
-                        fall(diagnosis, &joined(&all)),
+                        fall(diagnosis, &listed(&all)),
                         behaviour(diagnosis)
                     ),
                     // The verdict has the behaviour.
@@ -216,7 +212,7 @@ fn finding(diagnosis: &Diagnosis, plant: Plant) -> Answer {
                 Tone::Finding,
                 format!("{}, and something is unexplained", missing(&called(&diagnosis.model, names), &[])),
             )
-            .evidence(fall(diagnosis, &joined(&diagnosis.stand_ins)))
+            .evidence(fall(diagnosis, &listed(&diagnosis.stand_ins)))
             .confidence(format!(
                 "Certified at a level of {} %. {} {:.0} % of the variance that {} unexplained without it. The \
                  cause of the remaining error is not identified.",
@@ -258,7 +254,7 @@ fn finding(diagnosis: &Diagnosis, plant: Plant) -> Answer {
             Answer::new(Tone::Warning, "something is missing; its cause is not identified")
                 .evidence(format!(
                     "With {} as surrogates the {error} falls {}.",
-                    joined(&named(&diagnosis.stand_ins, plant)),
+                    listed(&named(&diagnosis.stand_ins, plant)),
                     from_to(first, last, diagnosis)
                 ))
                 .confidence(format!(
@@ -270,7 +266,7 @@ fn finding(diagnosis: &Diagnosis, plant: Plant) -> Answer {
                 })
         }
         Verdict::Unexplained => {
-            let tried = diagnosis.ladder.last().map(|rung| joined(&named(&rung.effects, plant)));
+            let tried = diagnosis.ladder.last().map(|rung| listed(&named(&rung.effects, plant)));
             let tried = tried.filter(|tried| !tried.is_empty());
             Answer::new(
                 Tone::Warning,
@@ -289,10 +285,26 @@ fn finding(diagnosis: &Diagnosis, plant: Plant) -> Answer {
     }
 }
 
-/// The confidence in the named effects, with its test.
+/// The confidence in the named effects, with its test, and whether they leave an error.
 fn confidence(diagnosis: &Diagnosis) -> String {
     let p = p_bound(diagnosis.p_value.unwrap_or(1.0));
-    format!("Family-wise p {p} over {} models.", diagnosis.tried)
+    let last = diagnosis
+        .ladder
+        .last()
+        .map_or(f64::NAN, |rung| rung.validate_rmse);
+    let rest = match diagnosis.noise_source {
+        NoiseSource::Measured | NoiseSource::Repeats => left(last / diagnosis.noise_estimate),
+        NoiseSource::Scatter => "",
+    };
+    format!("Family-wise p {p} over {} models.{rest}", diagnosis.tried)
+}
+
+/// What an error at this multiple of the noise level leaves.
+fn left(over_noise: f64) -> &'static str {
+    match over_noise > TERMS.near_the_floor {
+        true => " The remaining error above the noise level is unexplained.",
+        false => "",
+    }
 }
 
 /// The reduction of the error by the named effects. Where additional lags of the given model fit equally well, it is
@@ -342,7 +354,11 @@ fn behaviour(diagnosis: &Diagnosis) -> String {
         text.or_else(|| summary().map(str::to_owned))
             .unwrap_or_else(|| format!("the behaviour of `{name}`"))
     });
-    each.collect::<Vec<_>>().join("; and ")
+    let each: Vec<String> = each.collect();
+    match each.as_slice() {
+        [before @ .., last] if !before.is_empty() => format!("{}; and {last}", before.join("; ")),
+        _ => each.concat(),
+    }
 }
 
 /// The claim of a diagnosis. In a flow, effects are stated by name, in other plants by behaviour,
@@ -377,7 +393,7 @@ fn missing(names: &[String], sets: &[Vec<String>]) -> String {
     match each.as_slice() {
         [one] => format!("{one} is missing"),
         several if sets.iter().all(|set| set.len() < 2) => {
-            format!("{} are missing", several.join(" and "))
+            format!("{} are missing", listed(several))
         }
         several => format!("{} are missing", several.join(", and ")),
     }
@@ -412,7 +428,7 @@ fn surrogates(answer: &mut Answer, diagnosis: &Diagnosis, plant: Plant) {
     let several = diagnosis.stand_ins.len() > 1;
     answer.note(format!(
         "{} {} in the model as {}: {}.",
-        joined(&named(&diagnosis.stand_ins, plant)),
+        listed(&named(&diagnosis.stand_ins, plant)),
         if several { "are" } else { "is" },
         if several { "surrogates" } else { "a surrogate" },
         match of_channels(diagnosis).is_empty() {
@@ -439,7 +455,7 @@ fn records(answer: &mut Answer, diagnosis: &Diagnosis, judged_rmse: Option<f64>)
     match (diagnosis.held_out_by, &diagnosis.quoted) {
         (HeldOutBy::Records, Some(quoted)) => answer.note(format!(
             "Independent estimate on {}, which played no part in any choice: RMSE {} → {}{}.",
-            joined(&quoted.records),
+            listed(&quoted.records),
             significant(quoted.before_rmse, 3),
             significant(quoted.validate_rmse, 3),
             quoted.noise_rmse.map_or(String::new(), |noise| format!(
@@ -501,9 +517,9 @@ fn dynamics(answer: &mut Answer, diagnosis: &Diagnosis) {
         [] => return,
         [one] => format!("The plant has a memory of {one} s, with weight"),
         // Neighbouring lags share one memory, so that only the sum of their weights is known.
-        [before @ .., last] => format!(
-            "The plant has memories of {} and {last} s, whose weights add up to",
-            before.join(", ")
+        several => format!(
+            "The plant has memories of {} s, whose weights add up to",
+            listed(several)
         ),
     };
     let sum = |weight: fn(&Memory) -> f64| -> String {
@@ -615,5 +631,13 @@ mod tests {
         assert_eq!(both, "valve-lag and echo-path are missing");
         let both = said(&[&alike, &["echo-path"]]);
         assert_eq!(both, "hot-film-lag or flow-lag, and echo-path are missing");
+        let three = said(&[&["valve-lag"], &["echo-path"], &["dry-friction"]]);
+        assert_eq!(three, "valve-lag, echo-path and dry-friction are missing");
+    }
+
+    #[test]
+    fn an_error_above_the_noise_is_said_to_remain() {
+        assert!(left(1.24).contains("unexplained"));
+        assert!([1.03, f64::NAN].iter().all(|over| left(*over).is_empty()));
     }
 }

@@ -4,6 +4,7 @@ use super::{Words, aligned, lines, short};
 use host_fit::data::Plant;
 use host_fit::diagnose::{Diagnosis, ParameterEstimate, RULES, Ranked, Rung};
 use host_fit::indicators::ErrorKind;
+use host_fit::picture::listed;
 use host_fit::residual::Failures;
 use host_fit::steps::{Finding, Terms, effect_in_words, p_bound};
 use model_core::effects::spec;
@@ -166,7 +167,7 @@ fn outcome_alone(r: &Ranked, diagnosis: &Diagnosis, plant: Plant) -> String {
         let others = diagnosis.missing.iter().filter(|name| **name != r.effect);
         let others: Vec<String> = others.map(|name| effect_in_words(name, plant)).collect();
         return match is_named_beside(r, diagnosis) {
-            true => format!("named beside {}", others.join(" and ")),
+            true => format!("named beside {}", listed(&others)),
             false => "named".to_owned(),
         };
     }
@@ -191,7 +192,7 @@ fn outcome_alone(r: &Ranked, diagnosis: &Diagnosis, plant: Plant) -> String {
     }
     match diagnosis.missing.as_slice() {
         [] => "significant, but explains too little".to_owned(),
-        named if plant == Plant::Flow => format!("imitates {}", named.join(" and ")),
+        named if plant == Plant::Flow => format!("imitates {}", listed(named)),
         [_] => "imitates the named behaviour".to_owned(),
         _ => "imitates the named behaviours".to_owned(),
     }

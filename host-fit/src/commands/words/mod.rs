@@ -18,7 +18,7 @@ use host_fit::diagnose::ParameterEstimate;
 use host_fit::identify::Refinement;
 use host_fit::indicators::{Indicators, Scores};
 use host_fit::model::{Delay, Law, Model, TransportLaw};
-use host_fit::picture::{significant, time};
+use host_fit::picture::{listed, significant, time};
 use host_fit::rules::Rulebook;
 use host_fit::steps::{
     Average, Beside, BoardConstants, Comparison, EffectEntry, Extension, Identification,
@@ -241,7 +241,7 @@ impl Words for Extension {
 
 /// Terms of the given model that are no longer needed.
 pub(crate) fn dropped_terms(found: &Extension) -> Option<String> {
-    let (effects, dropped) = (found.effects.join(" and "), found.dropped.join(", "));
+    let (effects, dropped) = (listed(&found.effects), found.dropped.join(", "));
     (!dropped.is_empty()).then(|| format!("No longer needed with {effects}: {dropped}."))
 }
 

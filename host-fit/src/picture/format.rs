@@ -1,4 +1,4 @@
-//! Formatting of numbers for readers.
+//! Formatting of numbers and lists for readers.
 
 /// A time, s, as a number with a suitable unit.
 #[must_use]

@@ -116,30 +116,30 @@ pub(super) fn beyond(glance: &Glance) -> String {
     )
 }
 
+/// An error over the noise level, if that is known.
+fn over_noise(rmse: f64, diagnosis: &Diagnosis) -> Option<f64> {
+    let is_known = diagnosis.noise_source != NoiseSource::Scatter && diagnosis.noise_estimate > 0.0;
+    is_known.then(|| rmse / diagnosis.noise_estimate)
+}
+
 /// An error relative to the noise level, if that is known: "1.01 × the noise level (RMSE 0.0104)".
 fn beside_noise(rmse: f64, diagnosis: &Diagnosis) -> String {
-    let noise = diagnosis.noise_estimate;
-    match diagnosis.noise_source {
-        NoiseSource::Measured | NoiseSource::Repeats if noise > 0.0 => format!(
-            "{} × the noise level (RMSE {})",
-            times(rmse / noise),
-            significant(rmse, 3)
-        ),
-        _ => format!("RMSE {}", significant(rmse, 3)),
+    let own = significant(rmse, 3);
+    match over_noise(rmse, diagnosis) {
+        Some(ratio) => format!("{} × the noise level (RMSE {own})", times(ratio)),
+        None => format!("RMSE {own}"),
     }
 }
 
 /// Two errors relative to the noise level: "from 2.64 to 1.01 × the noise level (RMSE 0.0273 → 0.0104)".
 fn from_to(before: f64, after: f64, diagnosis: &Diagnosis) -> String {
-    let noise = diagnosis.noise_estimate;
+    let ratio = |rmse: f64| over_noise(rmse, diagnosis).map(times);
     let (from, to) = (significant(before, 3), significant(after, 3));
-    match diagnosis.noise_source {
-        NoiseSource::Measured | NoiseSource::Repeats if noise > 0.0 => format!(
-            "from {} to {} × the noise level (RMSE {from} → {to})",
-            times(before / noise),
-            times(after / noise),
-        ),
-        _ => format!("from RMSE {from} to {to}"),
+    match ratio(before).zip(ratio(after)) {
+        Some((first, last)) => {
+            format!("from {first} to {last} × the noise level (RMSE {from} → {to})")
+        }
+        None => format!("from RMSE {from} to {to}"),
     }
 }
 
@@ -288,14 +288,9 @@ fn finding(diagnosis: &Diagnosis, plant: Plant) -> Answer {
 /// The confidence in the named effects, with its test, and whether they leave an error.
 fn confidence(diagnosis: &Diagnosis) -> String {
     let p = p_bound(diagnosis.p_value.unwrap_or(1.0));
-    let last = diagnosis
-        .ladder
-        .last()
-        .map_or(f64::NAN, |rung| rung.validate_rmse);
-    let rest = match diagnosis.noise_source {
-        NoiseSource::Measured | NoiseSource::Repeats => left(last / diagnosis.noise_estimate),
-        NoiseSource::Scatter => "",
-    };
+    let last = diagnosis.ladder.last();
+    let last = last.and_then(|rung| over_noise(rung.validate_rmse, diagnosis));
+    let rest = last.map_or("", left);
     format!("Family-wise p {p} over {} models.{rest}", diagnosis.tried)
 }
 

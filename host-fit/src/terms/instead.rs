@@ -57,8 +57,8 @@ impl Search<'_> {
         }
     }
 
-    /// Replaces base terms of the best hypothesis by an effect if that lowers the score, and by further effects while the
-    /// error is above the noise level.
+    /// Replaces base terms of the best hypothesis by effects, one after the other, as long as that lowers the score and
+    /// the hypothesis has no effect or an error clearly above the noise.
     fn with_effects_instead(&self, found: &mut Found) {
         while (found.best.is_bare() || self.over(&found.best) > RULES.near_the_floor)
             && let Some(better) = self.with_an_effect_instead(found)

@@ -18,7 +18,8 @@ rules! {
     same_quantity: f64 = 0.95, "correlation", "judgement: a second heater with its own lag has a lower correlation";
     /// A model within this factor of the noise level is searched no further.
     at_the_floor: f64 = 1.005, "times the noise level", "two standard deviations of the error of three records of 10 s";
-    /// If the best model is above this factor of the noise level, the second-best is followed as well.
+    /// If the best model is above this factor of the noise level, the second-best is followed as well, effects are tried
+    /// in place of base terms even if it has effects, and the verdict says that an error remains.
     near_the_floor: f64 = 1.05, "times the noise level", "judgement: half of the uncertainty of `y_sd`";
     /// The second-best model is followed, and terms are removed from the best model without effects, if its error is within
     /// this factor of the best.

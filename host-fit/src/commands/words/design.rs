@@ -5,7 +5,7 @@ use closed_loop::{Figures, span};
 use host_fit::design::{
     Case, CaseGroup, Certificate, Margin, Optimum, Proof, RULES, TrackDesign, Weighed, judged,
 };
-use host_fit::picture::{fixed, signed, significant, time};
+use host_fit::picture::{fixed, listed, signed, significant, time};
 use host_fit::steps::{Design, DesignOutcome};
 
 impl Words for Design {
@@ -103,7 +103,7 @@ fn optimum_words(optimum: &Optimum, period_s: f64) -> String {
         format!(
             "best: period {}, open {}; mean y {:.3} with {:.1} % of the air ({} under steady blowing){}",
             length(law.period),
-            pulses.join(" and "),
+            listed(&pulses),
             optimum.mean,
             100.0 * optimum.duty,
             optimum

@@ -109,7 +109,10 @@ fn every_kind_of_model_is_identified() {
 
     let (document, model) = found(
         "ramp-cfd",
-        &small("one-step", "--effect amplitude-saturation"),
+        &small(
+            "one-step",
+            "--effect amplitude-saturation --evaluations 100",
+        ),
     );
     assert!(model.contains("amplitude-saturation"));
     assert!(

@@ -75,6 +75,14 @@ impl Certificate {
     pub fn holds_beside_others(&self) -> bool {
         self.holds() && self.share >= RULES.certified_share
     }
+
+    /// Whether the effect may be named in a model that leaves an error above the noise level, or none.
+    pub(super) fn permits_a_name(&self, error_remains: bool) -> bool {
+        match error_remains {
+            true => self.holds_beside_others(),
+            false => self.holds(),
+        }
+    }
 }
 
 /// Parsimony: the final model has more evidence than the given one, with fewer parameters.
@@ -460,7 +468,10 @@ mod tests {
                 share,
                 curve: None,
             };
-            (certificate.holds(), certificate.holds_beside_others())
+            let named = [false, true].map(|remains| certificate.permits_a_name(remains));
+            let holds = [certificate.holds(), certificate.holds_beside_others()];
+            assert_eq!(named, holds);
+            (holds[0], holds[1])
         };
         assert_eq!(holds(223.0, 0.86), (true, true));
         // Most of what the effect explains may have another cause.

@@ -208,7 +208,7 @@ pub(super) fn not_tried(search: &Search<'_>, model: &Model) -> Vec<NotTried> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::residual::plants::{base, records};
+    use crate::residual::plants::{base, long_records};
     use crate::terms::Bench;
     use std::sync::atomic::AtomicBool;
 
@@ -216,7 +216,7 @@ mod tests {
     /// point, so both are fitted, whichever was found.
     #[test]
     fn an_effect_that_does_as_well_as_the_found_one_is_fitted() {
-        let records = records(&["dry-friction"], &[], 3);
+        let records = long_records(&["dry-friction"], &[], 3);
         let bench = Bench::of(&base(&records), &records).expect("records to learn from");
         let never = AtomicBool::new(false);
         let search = Search::silent(&bench.judge, 1, &never);

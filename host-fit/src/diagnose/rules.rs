@@ -36,8 +36,8 @@ rules! {
     /// reported as surrogates.
     stands_in: f64 = 0.25, "share of the model error above the noise", "on published flows, an echo with 241 nats of \
          evidence explains a share of 0.46";
-    /// An effect is certified although another error remains if its e-value is large enough and it explains this
-    /// share of the variance that the best model without it leaves.
+    /// An effect is named or certified although another error remains if its e-value is large enough and it explains
+    /// this share of the variance that the best model without it leaves.
     certified_share: f64 = 0.7, "share of the model error above the noise", "six surrogates on simulated rigs: \
          the four right ones explained 0.72 to 1.00, the two wrong ones 0.56 and 0.62";
     /// An effect is a surrogate if the interval of each of its positive parameters spans more than this factor, or if the

@@ -199,10 +199,12 @@ impl Session<'_> {
             &found.best
         };
         let certificates = self.certificates(subject, &sets, others, &found, !order.is_empty());
-        // The first effect without a certificate and all after it are surrogates.
+        // The first effect whose certificate does not permit a name, and all after it, are surrogates.
+        let remains = judge.noise_source != NoiseSource::Scatter
+            && judge.over_noise(last.judged.rmse()) > RULES.floor_margin;
         let holds = |spec: &&&'static Spec| {
             let own = certificates.get(spec.name);
-            own.is_none_or(Certificate::holds)
+            own.is_none_or(|own| own.permits_a_name(remains))
         };
         let evident = order.iter().take(way.proven).take_while(holds).count();
         let is_known = |spec: &&&'static Spec| is_identified(&parameters[spec.name], spec);

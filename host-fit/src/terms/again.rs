@@ -46,7 +46,7 @@ impl Search<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::residual::plants::{self, base, records};
+    use crate::residual::plants::{base, drift, long_records};
     use crate::terms::Bench;
     use model_core::effects::spec;
     use std::sync::atomic::AtomicBool;
@@ -54,15 +54,15 @@ mod tests {
     /// A drift with two exponential parts, of 0.6 s and 5 s.
     #[test]
     fn a_drift_of_two_time_constants_is_two_drifts() {
-        let mut records = records(&[], &[], 3);
+        let mut records = long_records(&[], &[], 3);
         let given = base(&records);
-        plants::drift(&mut records, &[(0.10, 0.6), (0.12, 5.0)]);
+        drift(&mut records, &[(0.10, 0.6), (0.12, 5.0)]);
         let bench = Bench::of(&given, &records).expect("records to learn from");
         let never = AtomicBool::new(false);
         let search = Search::silent(&bench.judge, 4, &never);
-        let drift = spec("thermal-drift").expect("in the catalogue");
+        let exponential = spec("thermal-drift").expect("in the catalogue");
         let mut one = bench.given.clone();
-        one.add(drift, &[0.2, 2.0], None);
+        one.add(exponential, &[0.2, 2.0], None);
         let one = Hypothesis::new(bench.judge.refitted(&one).expect("stable"));
         let over = |rmse: f64| bench.judge.over_noise(rmse);
         assert!(
@@ -71,9 +71,9 @@ mod tests {
             over(one.judged.rmse())
         );
         let own = one.judged.rmse();
-        let two = search.again(&one, drift, own).expect("stable");
+        let two = search.again(&one, exponential, own).expect("stable");
         assert!(over(two.rmse()) < 1.03, "{}", over(two.rmse()));
-        assert!(search.again(&one, drift, 0.2 * own).is_none());
+        assert!(search.again(&one, exponential, 0.2 * own).is_none());
         let echo = spec("echo-path").expect("in the catalogue");
         assert!(search.again(&one, echo, own).is_none());
     }

@@ -162,10 +162,10 @@ mod tests {
         );
     }
 
-    /// 10⁹ samples: eleven days at 1 kHz.
+    /// More than a day at 1 kHz.
     #[test]
-    fn the_average_does_not_drift_in_a_thousand_million_samples() {
-        run(1_000_000_000);
+    fn the_average_does_not_drift_in_a_day() {
+        run(100_000_000);
     }
 
     #[test]

@@ -250,7 +250,9 @@ impl PrintedTimes {
             return Err(fault(0, DataProblem::TooFewRows(self.time.len())));
         }
         let mean = span / steps as f64;
-        let rounding = self.resolution() / steps as f64;
+        // Late times may be printed in more digits than a number has.
+        let spacing = f64::EPSILON * self.time.iter().fold(0.0, |latest: f64, t| latest.max(t.abs()));
+        let rounding = self.resolution().max(spacing) / steps as f64;
         match stated {
             Some(stated) => {
                 let allowed = RULES.clock * stated.period_s + rounding;
@@ -313,9 +315,13 @@ mod tests {
     }
 
     fn printed(n: usize, period: f64, digits: usize) -> PrintedTimes {
+        printed_from(0.0, n, period, digits)
+    }
+
+    fn printed_from(t0: f64, n: usize, period: f64, digits: usize) -> PrintedTimes {
         let mut times = PrintedTimes::default();
         for k in 0..n {
-            let text = format!("{:.digits$}", k as f64 * period);
+            let text = format!("{:.digits$}", t0 + k as f64 * period);
             times.time.push(text.parse().unwrap());
             times.unit.push(printed_unit(text.as_bytes()));
         }
@@ -394,6 +400,15 @@ mod tests {
             slightly.problem,
             DataProblem::PeriodMismatch { .. }
         ));
+    }
+
+    /// Eighty days after zero, doubles are 0.9 ns apart, however many digits are printed.
+    #[test]
+    fn late_times_are_no_more_exact_than_doubles() {
+        let period = 6.880_207_171_669_66e-8;
+        let times = printed_from(6_953_183.447_965_344, 2, period, 12);
+        assert_eq!(times.clock(stated(period)).unwrap().period_s, period);
+        assert!(times.clock(stated(1.1 * period)).is_err());
     }
 
     #[test]

@@ -197,7 +197,7 @@ fn factors_need_a_law() {
 #[cfg(unix)]
 #[test]
 fn an_interrupt_keeps_the_best_so_far() {
-    let interrupted = [2.5, 10.0, 40.0].into_iter().find_map(|seconds| {
+    let interrupted = [5.0, 20.0, 40.0].into_iter().find_map(|seconds| {
         let folder = tempfile::tempdir().expect("a folder");
         let model = folder.path().join("model.toml");
         let output = interrupted_after(seconds, &model);

@@ -5,7 +5,7 @@ use scenarios::invariances::{Change, Options, run};
 use std::time::Duration;
 
 /// Rigs on which each change is tried here.
-const CASES: u64 = 3;
+const CASES: u64 = 2;
 
 #[track_caller]
 fn holds(change: Change) {

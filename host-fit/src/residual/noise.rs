@@ -34,15 +34,13 @@ pub(super) fn floor(records: &[&Record], residual: &[Vec<f64>]) -> (Vec<Vec<f64>
             .iter()
             .zip(records)
             .map(|(e, record)| by_scatter(e.get(record.lead..).unwrap_or(&[])));
-        (
-            each.sum::<f64>() / residual.len().max(1) as f64,
-            NoiseSource::Scatter,
-        )
+        // The rounding error of a coarse reading changes slowly where the noise is smaller than a step.
+        let scatter = each.sum::<f64>() / residual.len().max(1) as f64;
+        (scatter + rounding, NoiseSource::Scatter)
     } else {
         let mean = repeats.iter().sum::<f64>() / repeats.len() as f64;
-        (mean, NoiseSource::Repeats)
+        (mean.max(rounding), NoiseSource::Repeats)
     };
-    let variance = variance.max(rounding);
     let constant = residual.iter().map(|e| vec![variance; e.len()]).collect();
     (constant, source)
 }

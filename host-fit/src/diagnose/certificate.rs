@@ -332,11 +332,10 @@ fn searched(model: &Model) -> usize {
     count(model) + lags.len()
 }
 
-/// Whether a model is of first or second order, with at most two products and without effects; base terms may be in it.
+/// Whether a model is of first or second order without effects; base terms may be in it.
 fn is_of_second_order(model: &Model) -> bool {
     let is_nuisance = |name: &str| NUISANCES.iter().any(|spec| spec.name == name);
     model.state_lags.iter().all(|lag| *lag <= 2)
-        && model.product_lags.len() <= 2
         && model.effects.iter().all(|added| is_nuisance(&added.name))
 }
 

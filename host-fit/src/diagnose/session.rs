@@ -129,11 +129,12 @@ impl Session<'_> {
                 None => break way,
             }
         };
-        // If no effect has a certificate and the given model is as good without them, the given model is the answer.
+        // If the most important effect may not be named and the given model is as good without the effects, the given
+        // model is the answer.
         if conclusion.verdict == Verdict::EffectMissing
             && self.as_given.rmse()
                 <= (1.0 + RULES.worthwhile) * self.error_as_given(&conclusion.model)
-            && !self.first_is_certified(&conclusion.model, &way, &compared, &found)
+            && !self.first_has_a_name(&conclusion.model, &way, &compared, &found)
         {
             let explained =
                 self.fits(&conclusion.model.judged) || judge.noise_source == NoiseSource::Scatter;
@@ -298,8 +299,8 @@ impl Session<'_> {
         }
     }
 
-    /// Whether the most important effect has a certificate.
-    fn first_is_certified(
+    /// Whether the most important effect has a certificate and parameters that the records determine.
+    fn first_has_a_name(
         &self,
         model: &Hypothesis,
         way: &Way,
@@ -308,11 +309,12 @@ impl Session<'_> {
     ) -> bool {
         let sets = self.sets(model, &way.order, way.proven, compared, &found.root);
         let certificates = self.certificates(model, &sets, &compared.others, found, true);
-        let first = way
-            .order
-            .first()
-            .and_then(|spec| certificates.get(spec.name));
-        first.is_none_or(Certificate::holds)
+        way.order.first().is_none_or(|first| {
+            let fit = self.judge().final_fit(&model.judged);
+            let estimates = estimates_among(&fit, &found.as_good_as(model), first, &self.units);
+            let own = certificates.get(first.name);
+            own.is_none_or(Certificate::holds) && is_identified(&estimates, first)
+        })
     }
 
     /// The effect that lowers the error of `hypothesis` the least, and the hypothesis refitted without it. A measured

@@ -251,7 +251,8 @@ impl PrintedTimes {
         }
         let mean = span / steps as f64;
         // Late times may be printed in more digits than a number has.
-        let spacing = f64::EPSILON * self.time.iter().fold(0.0, |latest: f64, t| latest.max(t.abs()));
+        let latest = self.time.iter().map(|t| t.abs()).fold(0.0, f64::max);
+        let spacing = f64::EPSILON * latest;
         let rounding = self.resolution().max(spacing) / steps as f64;
         match stated {
             Some(stated) => {

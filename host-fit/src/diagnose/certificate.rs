@@ -54,7 +54,8 @@ impl Certificate {
     }
 
     /// Whether the evidence against other models is large enough.
-    pub(super) fn is_evident(&self) -> bool {
+    #[must_use]
+    pub fn is_evident(&self) -> bool {
         self.log_e >= self.least()
     }
 

@@ -129,11 +129,14 @@ impl Session<'_> {
                 None => break way,
             }
         };
-        // If the most important effect may not be named and the given model is as good without the effects, the given
-        // model is the answer.
+        // If the most important effect may not be named and the given model is as good without the effects, or at the
+        // noise level, the given model is the answer.
+        let is_as_good = |other: &Hypothesis| {
+            self.is_at_noise(self.as_given)
+                || self.as_given.rmse() <= (1.0 + RULES.worthwhile) * self.error_as_given(other)
+        };
         if conclusion.verdict == Verdict::EffectMissing
-            && self.as_given.rmse()
-                <= (1.0 + RULES.worthwhile) * self.error_as_given(&conclusion.model)
+            && is_as_good(&conclusion.model)
             && !self.first_has_a_name(&conclusion.model, &way, &compared, &found)
         {
             let explained =

@@ -5,7 +5,7 @@ use super::outcome::Conclusion;
 use super::session::Session;
 use super::{RULES, Verdict};
 use crate::parallel;
-use crate::residual::{FailureCoordinate, NoiseSource, examine};
+use crate::residual::{Dependence, FailureCoordinate, NoiseSource, examine};
 use crate::terms::{
     Found, HeldOut, HeldOutBy, Hypothesis, Judged, Likelihood, RULES as TERMS, Search, Term,
 };
@@ -48,8 +48,9 @@ impl Session<'_> {
         })
     }
 
-    /// Whether the error is a function of any coordinate other than its own frequency. Where there are validation
-    /// records, estimation records count as well: a few validation records show no dependence.
+    /// Whether the error is a function of any coordinate other than its own frequency. An error of which only the
+    /// magnitude depends on a coordinate may be noise. Where there are validation records, estimation records count as
+    /// well: a few validation records show no dependence.
     fn depends(&self, judged: &Judged) -> bool {
         let judge = self.judge();
         let (mut records, mut runs) = (Vec::new(), Vec::new());
@@ -73,6 +74,7 @@ impl Session<'_> {
             .by
             .iter()
             .filter(|place| place.coordinate != FailureCoordinate::FrequencyBand)
+            .filter(|place| place.dependence != Some(Dependence::Size))
             .any(|place| place.explained_fraction > RULES.depends)
     }
 

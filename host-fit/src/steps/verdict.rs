@@ -231,9 +231,10 @@ fn finding(diagnosis: &Diagnosis, plant: Plant) -> Answer {
         }
         Verdict::PartlyExplained => {
             let own = |name| diagnosis.certificates.get(name);
-            let mut certificates = diagnosis.stand_ins.iter().filter_map(own);
+            let certificates: Vec<&Certificate> =
+                diagnosis.stand_ins.iter().filter_map(own).collect();
             let unknown = |name: &String| !diagnosis.is_identified(name);
-            let curve_is_better = certificates.clone().any(|one| one.better_curve().is_some());
+            let curve_is_better = certificates.iter().any(|one| one.better_curve().is_some());
             // Where a curve of the channel is better, the channel acts at another place.
             let channels = match curve_is_better {
                 true => &[],
@@ -242,8 +243,10 @@ fn finding(diagnosis: &Diagnosis, plant: Plant) -> Answer {
             let why = if !channels.is_empty() {
                 "the model was identified without the measured channel, and the cause is decided after it is identified \
                  with the channel"
-            } else if certificates.any(|one| one.evidence_nats < 0.0) {
+            } else if certificates.iter().any(|one| one.evidence_nats < 0.0) {
                 "there is more evidence for a model without them"
+            } else if certificates.iter().any(|one| !one.is_evident()) {
+                "there is too little evidence against a model without them"
             } else if curve_is_better {
                 "a curve explains the records as well"
             } else if diagnosis.stand_ins.iter().any(unknown) {

@@ -44,8 +44,8 @@ rules! {
     /// interval of its amplitude contains 0: the records do not determine it.
     identified: f64 = 50.0, "times", "judgement; in a model with an edge-dependent delay, the interval of a wrong \
          hysteresis spanned a factor of 180; among 24 right names in published flows and pairs none spanned so much";
-    /// Where the level of slow noise is unknown, a model error is significant if this share of it is a function of
-    /// a coordinate.
+    /// Where the level of slow noise is unknown, a model error is significant if this share of it, and not of its
+    /// magnitude alone, is a function of a coordinate.
     depends: f64 = 0.1, "share of the model error above the noise", "the public sets";
     /// Where the level of slow noise is unknown, a model error is also significant if it exceeds this share,
     /// because no usable recording is so noisy.

@@ -189,4 +189,27 @@ mod tests {
             assert!((ratio - 1.0).abs() < 0.03, "{resolution}: {ratio}");
         }
     }
+
+    /// A converter with steps of three times the noise: between its steps the rounding error changes as slowly as y.
+    #[test]
+    fn rounding_beyond_the_noise_adds_to_it() {
+        let mut rng = ChaCha8Rng::seed_from_u64(9);
+        let (mut y, mut e) = (Vec::new(), Vec::new());
+        for k in 0..4000 {
+            let noise: f64 = (0..12).map(|_| rng.random_range(-0.5..0.5)).sum();
+            let smooth = 20.0 * (f64::from(k) / 300.0).sin();
+            let read = ((smooth + noise) / 3.0).round() * 3.0;
+            y.push(read);
+            e.push(read - smooth);
+        }
+        let total = e.iter().map(|e| e * e).sum::<f64>() / e.len() as f64;
+        let u = (0..4000).map(|k| f64::from((k / 900) % 2)).collect();
+        let record = Record::new("r", Use::Identify, 1.0, u, y);
+        let scatter = (by_scatter(&e) / total).sqrt();
+        assert!(scatter < 0.7, "{scatter}");
+        let (noise, source) = floor(&[&record], &[e]);
+        assert_eq!(source, NoiseSource::Scatter);
+        let ratio = (noise[0][0] / total).sqrt();
+        assert!((0.9..1.3).contains(&ratio), "{ratio} {scatter}");
+    }
 }

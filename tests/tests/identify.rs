@@ -109,10 +109,7 @@ fn every_kind_of_model_is_identified() {
 
     let (document, model) = found(
         "ramp-cfd",
-        &small(
-            "one-step",
-            "--effect amplitude-saturation --evaluations 100",
-        ),
+        &small("one-step", "--effect amplitude-saturation"),
     );
     assert!(model.contains("amplitude-saturation"));
     assert!(

@@ -53,7 +53,7 @@ impl Certificate {
         (self.is_evident() && curve.evidence_nats < self.least()).then_some(curve)
     }
 
-    /// Whether the evidence against other models is large enough.
+    /// Whether the evidence against other models is large enough: log e ≥ ln(1/α).
     #[must_use]
     pub fn is_evident(&self) -> bool {
         self.log_e >= self.least()

@@ -138,21 +138,3 @@ fn pure_noise_explains_nothing() {
     println!("{alarms} of {coordinates} coordinates claim more than 5 %");
     assert!(50 * alarms <= coordinates, "{alarms} of {coordinates}");
 }
-
-/// The leading coordinates of each hidden effect, on which the rules of this module were calibrated.
-#[test]
-#[ignore = "prints a table: cargo test --release -p host-fit table_of_plants -- --ignored --nocapture"]
-fn table_of_plants() {
-    use firmware_sim::plant::{Effect, Fault};
-    let faults = Fault::NAMES.iter().map(|name| (*name, vec![], vec![*name]));
-    let effects = (Effect::NAMES.iter()).map(|name| (*name, vec![*name], vec![]));
-    for (name, effects, faults) in faults.chain(effects).chain([("nothing", vec![], vec![])]) {
-        for seed in 0..2 {
-            let found = split(&effects, &faults, seed);
-            println!("{name} {seed} {:.4}/{:.4}", found.rmse, found.noise_rmse);
-            for line in found.describe() {
-                println!("    {line}");
-            }
-        }
-    }
-}

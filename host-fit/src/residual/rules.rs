@@ -54,7 +54,7 @@ rules! {
     /// much.
     longer_cycle: f64 = 1.05, "times", "tuned on the plants with missing pulses in the test `faults_are_pointed_at`";
     /// Pulse number is correlated with time: it must explain this much more than time to be preferred.
-    pulses_are_a_clock: f64 = 1.3, "times", "the plants of `table_of_plants`";
+    pulses_are_a_clock: f64 = 1.3, "times", "simulated plants with each effect and fault of the catalogue";
 
     /// Segment length of spectra.
     piece: usize = 1024, "samples", "judgement: the longest lags are half as long";

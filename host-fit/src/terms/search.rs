@@ -184,7 +184,7 @@ impl Search<'_> {
         let mut all = vec![root];
         let (mut tried, mut purged) = (Vec::new(), Vec::new());
         let (mut last, mut stalled, mut since) = (RULES.rounds, 0, None);
-        let (mut from_bound, mut roots) = (0, 0..1);
+        let (mut from_bound, mut further) = (0, 0..0);
         for round in 1.. {
             if round > 1
                 && self.over(&all[best(&all, |_| true)]) > RULES.at_the_floor
@@ -192,7 +192,7 @@ impl Search<'_> {
             {
                 let first = all.len();
                 all.extend(second());
-                roots = first..all.len();
+                further = first..all.len();
             }
             let ended = round > last || stalled >= RULES.patience;
             let mut chosen = if ended {
@@ -206,14 +206,9 @@ impl Search<'_> {
                 (last, stalled, since) = (round + RULES.rounds_after, 0, Some(all.len()));
                 width = RULES.wider;
                 // A start may need two more effects, so that its own error does not recommend it.
-                let starts = roots.clone().filter(|start| !all[*start].expanded);
-                let starts = [0].into_iter().chain(starts);
-                chosen.push((end, true));
-                chosen.extend(
-                    starts
-                        .filter(|start| *start != end)
-                        .map(|start| (start, true)),
-                );
+                let unseen = further.clone().filter(|start| !all[*start].expanded);
+                let starts = [0].into_iter().chain(unseen).filter(|start| *start != end);
+                chosen = [end].into_iter().chain(starts).map(|i| (i, true)).collect();
             }
             // At the end of the search, fits with an effect at a bound get a few more rounds of screening, if
             // their error is below that of every result. With a further term the effect may leave the bound.
